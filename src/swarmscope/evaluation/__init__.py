@@ -1,0 +1,1 @@
+"""Reference paths, metrics, statistics and run folders."""

@@ -1,0 +1,83 @@
+"""Angles and plane geometry: scalars in, scalars out, radians and metres, REP-103 (x forward, y left, CCW)."""
+
+from __future__ import annotations
+
+import math
+
+from swarmscope._jit import jit_inline
+
+TWO_PI = 2.0 * math.pi
+
+
+@jit_inline
+def wrap_angle(angle: float) -> float:
+    """Return ``angle`` [rad] wrapped to (-pi, pi]."""
+    wrapped = angle - TWO_PI * math.floor((angle + math.pi) / TWO_PI)
+    if wrapped <= -math.pi:
+        wrapped += TWO_PI
+    return wrapped
+
+
+@jit_inline
+def angle_from(start: float, angle: float) -> float:
+    """Return how far one turns counter-clockwise from ``start`` to ``angle`` [rad], in [0, 2 pi)."""
+    turn = (angle - start) - TWO_PI * math.floor((angle - start) / TWO_PI)
+    return turn if turn < TWO_PI else 0.0
+
+
+@jit_inline
+def point_segment_distance(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> float:
+    """Return the distance [m] from point p to segment a-b."""
+    ux, uy = bx - ax, by - ay
+    length2 = ux * ux + uy * uy
+    t = 0.0
+    if length2 > 0.0:
+        t = min(1.0, max(0.0, ((px - ax) * ux + (py - ay) * uy) / length2))
+    dx, dy = px - (ax + t * ux), py - (ay + t * uy)
+    return math.sqrt(dx * dx + dy * dy)
+
+
+@jit_inline
+def ray_circle(dx: float, dy: float, cx: float, cy: float, radius: float) -> float:
+    """Return the range [m] along unit direction d at which a ray from the origin meets a circle, else inf.
+
+    From inside the circle the exit point is returned.
+    """
+    along = cx * dx + cy * dy
+    across = cx * dy - cy * dx
+    under = radius * radius - across * across
+    if under < 0.0:
+        return math.inf
+    half = math.sqrt(under)
+    if along - half >= 0.0:
+        return along - half
+    return along + half if along + half >= 0.0 else math.inf
+
+
+@jit_inline
+def ray_segment(dx: float, dy: float, ax: float, ay: float, bx: float, by: float) -> float:
+    """Return the range [m] along unit direction d at which a ray from the origin meets segment a-b, else inf."""
+    ux, uy = bx - ax, by - ay
+    denominator = dx * uy - dy * ux
+    if denominator == 0.0:
+        return math.inf
+    t = (ax * uy - ay * ux) / denominator
+    s = (ax * dy - ay * dx) / denominator
+    return t if t >= 0.0 and 0.0 <= s <= 1.0 else math.inf
+
+
+@jit_inline
+def segments_distance(
+    ax: float, ay: float, bx: float, by: float, cx: float, cy: float, dx: float, dy: float
+) -> float:
+    """Return the smallest distance [m] between segments a-b and c-d (0 where they cross)."""
+    o1 = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+    o2 = (bx - ax) * (dy - ay) - (by - ay) * (dx - ax)
+    o3 = (dx - cx) * (ay - cy) - (dy - cy) * (ax - cx)
+    o4 = (dx - cx) * (by - cy) - (dy - cy) * (bx - cx)
+    if o1 * o2 < 0.0 and o3 * o4 < 0.0:
+        return 0.0
+    return min(
+        min(point_segment_distance(ax, ay, cx, cy, dx, dy), point_segment_distance(bx, by, cx, cy, dx, dy)),
+        min(point_segment_distance(cx, cy, ax, ay, bx, by), point_segment_distance(dx, dy, ax, ay, bx, by)),
+    )

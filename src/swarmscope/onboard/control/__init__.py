@@ -1,0 +1,1 @@
+"""From a wanted direction to a velocity that is safe."""

@@ -1,0 +1,1 @@
+"""Scan to safe directions, features and areas."""

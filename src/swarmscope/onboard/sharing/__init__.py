@@ -1,0 +1,1 @@
+"""Features to bytes and back; requests, answers, ageing."""

@@ -1,0 +1,1 @@
+"""The world, its sensors, radio and motion."""

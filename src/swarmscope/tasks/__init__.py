@@ -1,0 +1,1 @@
+"""Seeded makers of worlds, starts and goals: one file each, found by scanning this folder."""

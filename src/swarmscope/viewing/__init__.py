@@ -1,0 +1,1 @@
+"""Pictures and the replay page, made from a run folder."""
