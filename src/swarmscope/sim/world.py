@@ -1,0 +1,362 @@
+"""The static world: its validated description (`WorldSpec`) and the plain arrays the kernels read (`World`).
+
+All lengths are metres in the world frame (x right, y up on a drawing; REP-103). Obstacles may overlap and may
+lie outside ``bounds``; ``bounds`` is what is drawn and where tasks put robots, it is not a wall.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import Annotated, Any, Literal, NamedTuple, Self
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+
+from swarmscope._jit import jit, jit_inline
+
+PIECE_M = 1.0
+"""Walls and polygon edges are cut into pieces of at most this length [m]: a look-up finds them by midpoint."""
+
+BIN_M = 1.0
+"""Side of a look-up bin [m]; larger only in worlds wider than `BINS_PER_SIDE` of them."""
+
+BINS_PER_SIDE = 512
+LONGEST_M = 1.0e5
+MAX_CELLS = 100_000_000
+GAP_CAP = 255
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+Bytes = npt.NDArray[np.uint8]
+
+
+def _reject_text(value: Any) -> Any:
+    if isinstance(value, bool | str | bytes):
+        raise ValueError("must be a number")
+    return value
+
+
+_Finite = Annotated[float, BeforeValidator(_reject_text), Field(allow_inf_nan=False)]
+Number = Annotated[_Finite, Field(ge=-LONGEST_M, le=LONGEST_M)]
+Length = Annotated[_Finite, Field(gt=0.0, le=LONGEST_M)]
+Point = tuple[Number, Number]
+
+
+class _Model(BaseModel):
+    """Settings shared by all parts of the description: unknown keys are errors, values do not change."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Circle(_Model):
+    """A disc: ``center`` [x, y] and ``radius`` [m], world frame."""
+
+    type: Literal["circle"] = "circle"
+    center: Point
+    radius: Length
+
+
+class Polygon(_Model):
+    """A solid convex polygon: ``points`` [[x, y], ...] [m], at least 3, in either orientation."""
+
+    type: Literal["polygon"] = "polygon"
+    points: Annotated[list[Point], Field(min_length=3)]
+
+    @model_validator(mode="after")
+    def _check_convex(self) -> Self:
+        _corners(self)
+        return self
+
+
+class Wall(_Model):
+    """A wall without thickness along the polyline ``points`` [[x, y], ...] [m], at least 2."""
+
+    type: Literal["wall"] = "wall"
+    points: Annotated[list[Point], Field(min_length=2)]
+
+    @model_validator(mode="after")
+    def _check_steps(self) -> Self:
+        for index, (first, second) in enumerate(pairwise(self.points)):
+            if first == second:
+                raise ValueError(f"points {index} and {index + 1} of the wall are the same")
+        return self
+
+
+class Grid(_Model):
+    """An occupancy grid: cell (row, col) covers ``origin + resolution * [col, row]`` to one cell further [m].
+
+    Row 0 is at the bottom. ``rows`` lists the solid runs ``[row, first_col, last_col]``, both included.
+    """
+
+    type: Literal["grid"] = "grid"
+    resolution: Length
+    origin: Point
+    width: Annotated[int, Field(ge=1)]
+    height: Annotated[int, Field(ge=1)]
+    rows: list[tuple[int, int, int]]
+
+    @model_validator(mode="after")
+    def _check_runs(self) -> Self:
+        cells = self.width * self.height
+        if cells > MAX_CELLS:
+            raise ValueError(f"the grid has {cells} cells, at most {MAX_CELLS} are possible")
+        for index, (row, first, last) in enumerate(self.rows):
+            if not (0 <= row < self.height and 0 <= first <= last < self.width):
+                raise ValueError(
+                    f"run {index} {[row, first, last]} is not [row, first_col, last_col] inside "
+                    f"{self.width} columns x {self.height} rows"
+                )
+        return self
+
+
+Obstacle = Annotated[Circle | Polygon | Wall | Grid, Field(discriminator="type")]
+
+
+class WorldSpec(_Model):
+    """What stands in the world: ``obstacles`` (at most one grid) and ``bounds`` [x0, y0, x1, y1] [m]."""
+
+    obstacles: list[Obstacle] = Field(default_factory=list)
+    bounds: tuple[Number, Number, Number, Number]
+
+    @model_validator(mode="after")
+    def _check_world(self) -> Self:
+        x0, y0, x1, y1 = self.bounds
+        if not (x0 < x1 and y0 < y1):
+            raise ValueError(f"bounds {list(self.bounds)} are not [x0, y0, x1, y1] with x0 < x1 and y0 < y1")
+        if sum(isinstance(obstacle, Grid) for obstacle in self.obstacles) > 1:
+            raise ValueError("a world can hold one grid at most")
+        return self
+
+
+class Bins(NamedTuple):
+    """Uniform look-up bins; bin ``row * columns + column`` holds items ``start[bin] .. start[bin + 1] - 1``.
+
+    Circles (by centre) and segments (by midpoint) are stored in bin order, so that the items of neighbouring
+    columns are one contiguous run. Polygons are listed in every bin that their bounding box meets.
+    """
+
+    x0: float
+    y0: float
+    size: float
+    columns: int
+    rows: int
+    circle_start: Ints
+    """(B + 1,) first circle of each bin."""
+    segment_start: Ints
+    """(B + 1,) first segment of each bin."""
+    polygon_start: Ints
+    """(B + 1,) first entry of ``polygon_items`` of each bin."""
+    polygon_items: Ints
+    """(K,) indices of polygons."""
+
+
+class World(NamedTuple):
+    """The static world as plain arrays for kernels; always the same dtypes, any of them may be empty."""
+
+    circles: Floats
+    """(C, 3) x, y, radius [m], in bin order."""
+    radius_max: float
+    """Largest radius of a circle [m], 0 without circles."""
+    segments: Floats
+    """(S, 4) ax, ay, bx, by [m], none longer than `PIECE_M`, in bin order."""
+    vertices: Floats
+    """(V, 2) corners of the convex polygons, counter-clockwise [m]."""
+    vertex_start: Ints
+    """(P + 1,) first corner of each polygon."""
+    bins: Bins
+    solid: Bytes
+    """(H, W) 1 = solid, row 0 at the bottom; (0, 0) without a grid."""
+    solid_gap: Bytes
+    """(H, W) steps (8 neighbours) from a cell to the nearest solid cell: 0 = solid itself, at most 255."""
+    solid_origin: Floats
+    """(2,) lower left corner of cell (0, 0) [m]."""
+    solid_resolution: float
+    """Side of a cell [m]."""
+
+
+def compile_world(spec: WorldSpec) -> World:
+    """Turn the description into arrays and look-up bins for the kernels."""
+    circles = _circle_rows(spec)
+    polygons = [_corners(obstacle) for obstacle in spec.obstacles if isinstance(obstacle, Polygon)]
+    segments = _segment_rows(spec, polygons)
+    x0, y0, size, columns, rows = _bin_layout(spec, circles, segments)
+
+    def bin_of(points: Floats) -> Ints:
+        column = np.clip(np.floor((points[:, 0] - x0) / size), 0, columns - 1)
+        row = np.clip(np.floor((points[:, 1] - y0) / size), 0, rows - 1)
+        return np.asarray(row * columns + column, dtype=np.int64)
+
+    midpoints = 0.5 * (segments[:, :2] + segments[:, 2:])
+    circle_order, circle_start = _counting_sort(bin_of(circles), columns * rows)
+    segment_order, segment_start = _counting_sort(bin_of(midpoints), columns * rows)
+    polygon_items, polygon_start = _polygon_entries(polygons, x0, y0, size, columns, rows)
+    solid, origin, resolution = _solid_arrays(spec)
+    return World(
+        circles=np.ascontiguousarray(circles[circle_order]),
+        radius_max=float(circles[:, 2].max(initial=0.0)),
+        segments=np.ascontiguousarray(segments[segment_order]),
+        vertices=np.ascontiguousarray(np.concatenate([np.zeros((0, 2)), *polygons])),
+        vertex_start=np.cumsum([0, *(len(p) for p in polygons)], dtype=np.int64),
+        bins=Bins(x0, y0, size, columns, rows, circle_start, segment_start, polygon_start, polygon_items),
+        solid=solid,
+        solid_gap=_gap(solid),
+        solid_origin=origin,
+        solid_resolution=resolution,
+    )
+
+
+@jit_inline
+def bin_index(value: float, low: float, size: float, count: int) -> int:
+    """Return the index of the bin in which ``value`` lies, held within 0 .. count - 1 (NaN: 0)."""
+    position = (value - low) / size
+    if not position > 0.0:
+        return 0
+    return int(min(position, count - 1.0))
+
+
+@jit_inline
+def bin_run(bins: Bins, start: Ints, row: int, x: float, y: float, reach: float) -> tuple[int, int]:
+    """Return first and stop of the items in one row of bins that may lie within ``reach`` [m] of x, y."""
+    low = bins.y0 + row * bins.size
+    aside = max(0.0, low - y - 1e-9, y - low - bins.size - 1e-9)
+    chord = math.sqrt(max(0.0, reach * reach - aside * aside))
+    first = bin_index(x - chord, bins.x0, bins.size, bins.columns)
+    last = bin_index(x + chord, bins.x0, bins.size, bins.columns)
+    return start[row * bins.columns + first], start[row * bins.columns + last + 1]
+
+
+def grid_from_solid(solid: npt.ArrayLike, resolution: float, origin: tuple[float, float]) -> Grid:
+    """Return the `Grid` of an array (H, W), row 0 at the bottom, in which everything but 0 is solid."""
+    cells = np.asarray(solid) != 0
+    if cells.ndim != 2:
+        raise ValueError(f"a grid needs a 2-D array, not one of shape {cells.shape}")
+    edges = np.diff(np.pad(cells.astype(np.int8), ((0, 0), (1, 1))), axis=1)
+    starts, ends = np.argwhere(edges == 1), np.argwhere(edges == -1)
+    runs = np.column_stack([starts, ends[:, 1] - 1]).tolist()
+    return Grid(resolution=resolution, origin=origin, width=cells.shape[1], height=cells.shape[0], rows=runs)
+
+
+def solid_from_grid(grid: Grid) -> Bytes:
+    """Return the cells of a `Grid` as an array (H, W) of uint8, row 0 at the bottom, 1 = solid."""
+    solid = np.zeros((grid.height, grid.width), dtype=np.uint8)
+    for row, first, last in grid.rows:
+        solid[row, first : last + 1] = 1
+    return solid
+
+
+def _corners(polygon: Polygon) -> Floats:
+    return _counter_clockwise(np.asarray(polygon.points, dtype=np.float64))
+
+
+def _counter_clockwise(points: Floats) -> Floats:
+    """Return the corners (n, 2) counter-clockwise; a ValueError says why they are no convex polygon."""
+    edges = np.roll(points, -1, axis=0) - points
+    lengths = np.hypot(edges[:, 0], edges[:, 1])
+    if not np.all(lengths > 0.0):
+        index = int(np.argmin(lengths))
+        raise ValueError(f"points {index} and {(index + 1) % len(points)} of the polygon are the same")
+    directions = edges / lengths[:, None]
+    following = np.roll(directions, -1, axis=0)
+    cross = directions[:, 0] * following[:, 1] - directions[:, 1] * following[:, 0]
+    turns = np.arctan2(cross, np.sum(directions * following, axis=1))
+    if float(np.sum(turns)) < 0.0:
+        return _counter_clockwise(np.ascontiguousarray(points[::-1]))
+    if np.max(cross) < 1e-9 or np.any(np.abs(turns) > math.pi - 1e-9):
+        raise ValueError("the polygon is degenerate: its points lie on a line, or it folds back on itself")
+    if np.min(turns) < -1e-9 or abs(float(np.sum(turns)) - 2.0 * math.pi) > 1e-3:
+        raise ValueError("the polygon is not convex; split it into convex parts")
+    return points
+
+
+def _circle_rows(spec: WorldSpec) -> Floats:
+    rows = [[*o.center, o.radius] for o in spec.obstacles if isinstance(o, Circle)]
+    return np.asarray(rows, dtype=np.float64).reshape(-1, 3)
+
+
+def _segment_rows(spec: WorldSpec, polygons: list[Floats]) -> Floats:
+    """Return walls and polygon edges (S, 4), cut into pieces that share their end points exactly."""
+    lines = [np.asarray(o.points, dtype=np.float64) for o in spec.obstacles if isinstance(o, Wall)]
+    lines += [np.vstack([p, p[:1]]) for p in polygons]
+    pieces = [_cut(a, b) for line in lines for a, b in pairwise(line)]
+    return np.concatenate([np.zeros((0, 4)), *pieces])
+
+
+def _cut(a: Floats, b: Floats) -> Floats:
+    count = max(1, math.ceil(math.dist(a, b) / PIECE_M * (1.0 + 1e-12)))
+    points = a + np.linspace(0.0, 1.0, count + 1)[:, None] * (b - a)
+    points[-1] = b
+    return np.hstack([points[:-1], points[1:]])
+
+
+def _bin_layout(spec: WorldSpec, circles: Floats, segments: Floats) -> tuple[float, float, float, int, int]:
+    """Return x0, y0, size, columns, rows of bins that cover the bounds, circle centres and segments."""
+    corners = np.asarray(spec.bounds, dtype=np.float64).reshape(2, 2)
+    points = np.vstack([corners, circles[:, :2], segments[:, :2], segments[:, 2:]])
+    low, high = points.min(axis=0), points.max(axis=0)
+    size = max(BIN_M, float(np.max(high - low)) / BINS_PER_SIDE)
+    columns, rows = (max(1, math.ceil(extent / size)) for extent in high - low)
+    return float(low[0]), float(low[1]), size, columns, rows
+
+
+def _counting_sort(keys: Ints, count: int) -> tuple[Ints, Ints]:
+    """Return the order that sorts ``keys`` (stable) and the first position (count + 1,) of each key in it."""
+    start = np.zeros(count + 1, dtype=np.int64)
+    np.cumsum(np.bincount(keys, minlength=count), out=start[1:])
+    return np.argsort(keys, kind="stable").astype(np.int64), start
+
+
+def _polygon_entries(
+    polygons: list[Floats], x0: float, y0: float, size: float, columns: int, rows: int
+) -> tuple[Ints, Ints]:
+    """Return which polygons' bounding boxes meet each bin, as (items, start)."""
+    keys: list[Ints] = [np.zeros(0, dtype=np.int64)]
+    items: list[Ints] = [np.zeros(0, dtype=np.int64)]
+    for index, polygon in enumerate(polygons):
+        first = np.floor((polygon.min(axis=0) - [x0, y0]) / size).astype(np.int64)
+        last = np.floor((polygon.max(axis=0) - [x0, y0]) / size).astype(np.int64)
+        column = np.arange(max(0, first[0]), min(columns - 1, last[0]) + 1)
+        row = np.arange(max(0, first[1]), min(rows - 1, last[1]) + 1)
+        keys.append((np.minimum(row, rows - 1)[:, None] * columns + column).ravel())
+        items.append(np.full(keys[-1].size, index, dtype=np.int64))
+    order, start = _counting_sort(np.concatenate(keys), columns * rows)
+    return np.ascontiguousarray(np.concatenate(items)[order]), start
+
+
+def _solid_arrays(spec: WorldSpec) -> tuple[Bytes, Floats, float]:
+    for obstacle in spec.obstacles:
+        if isinstance(obstacle, Grid):
+            origin = np.asarray(obstacle.origin, dtype=np.float64)
+            return solid_from_grid(obstacle), origin, float(obstacle.resolution)
+    return np.zeros((0, 0), dtype=np.uint8), np.zeros(2), 1.0
+
+
+def _gap(solid: Bytes) -> Bytes:
+    gap = np.where(solid != 0, 0, GAP_CAP).astype(np.uint8)
+    _spread_gap(gap)
+    return gap
+
+
+@jit
+def _spread_gap(gap: Bytes) -> None:
+    """Fill ``gap`` (H, W), 0 at solid cells, with the steps to the nearest of them: two sweeps are exact."""
+    height, width = gap.shape
+    for backward in range(2):
+        for i in range(height):
+            row = height - 1 - i if backward else i
+            before = row + 1 if backward else row - 1
+            for j in range(width):
+                col = width - 1 - j if backward else j
+                left = col + 1 if backward else col - 1
+                right = col - 1 if backward else col + 1
+                least = int(gap[row, col])
+                if 0 <= left < width:
+                    least = min(least, gap[row, left] + 1)
+                if 0 <= before < height:
+                    least = min(least, gap[before, col] + 1)
+                    if 0 <= left < width:
+                        least = min(least, gap[before, left] + 1)
+                    if 0 <= right < width:
+                        least = min(least, gap[before, right] + 1)
+                gap[row, col] = least
