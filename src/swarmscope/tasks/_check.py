@@ -1,0 +1,132 @@
+"""Can every robot stand where it is put and reach its goal? Asked of made forests, maps and users' own
+scenarios."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swarmscope.errors import UnsolvableWorldError
+from swarmscope.sim.world import compile_world
+from swarmscope.tasks._contract import Setup, check_robots
+from swarmscope.tasks._occupancy import (
+    Components,
+    Raster,
+    blocked_points,
+    cells_of,
+    components,
+    domain_of,
+    labels_at,
+    rasterise,
+)
+
+CLEARANCE_M = 0.05  # room beyond the robot's radius that a way must leave
+RESOLUTION_M = 0.05
+LARGEST_GRID_CELLS = 150_000_000  # worlds beyond this are checked on a grid coarse enough to stay below
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+class Reach(NamedTuple):
+    """How the ways are searched: grid cells whose centres keep ``radius`` + ``clearance`` [m] off all
+    obstacles."""
+
+    radius: float
+    clearance: float = CLEARANCE_M
+    resolution: float = RESOLUTION_M
+
+
+def check_setup(setup: Setup, radius: float) -> None:
+    """Raise an UnsolvableWorldError that names the robot and the reason, unless all can start and arrive.
+
+    Checked, in this order: finite numbers; robots of ``radius`` [m] that overlap at the start or at the
+    goals; starts and goals closer than ``radius`` to an obstacle; goals that cannot be reached with 0.05 m
+    to spare.
+    """
+    check_robots(len(setup.starts), radius)
+    starts, goals = np.asarray(setup.starts, dtype=np.float64), np.asarray(setup.goals, dtype=np.float64)
+    if starts.ndim != 2 or starts.shape[1] != 3 or goals.shape != (len(starts), 2):
+        raise UnsolvableWorldError(
+            f"starts (N, 3) and goals (N, 2) do not fit: {starts.shape}, {goals.shape}"
+        )
+    _check_finite("start", starts)
+    _check_finite("goal", goals)
+    _check_apart("start", starts[:, :2], radius)
+    _check_apart("goal", goals, radius)
+    _check_free("start", setup, starts[:, :2], radius)
+    _check_free("goal", setup, goals, radius)
+    bad = unreachable(setup, Reach(radius))
+    if bad.size:
+        raise UnsolvableWorldError(
+            f"robot {int(bad[0])}: no way from its start to its goal for a robot of radius {radius:g} m "
+            f"(searched with {CLEARANCE_M:g} m to spare on a {RESOLUTION_M:g} m grid)"
+        )
+
+
+def unreachable(setup: Setup, reach: Reach) -> Ints:
+    """Return the robots (K,) whose goal lies in another part of the free space than their start.
+
+    One labelling of the free cells serves all robots. A start or goal whose own cell is blocked counts as in
+    the free cell nearest to it within the clearance plus two cells.
+    """
+    domain = domain_of(setup.world, [setup.starts, setup.goals])
+    area = (domain[2] - domain[0]) * (domain[3] - domain[1])
+    resolution = max(reach.resolution, float(np.sqrt(area / LARGEST_GRID_CELLS)))
+    raster = rasterise(compile_world(setup.world), reach.radius + reach.clearance, domain, resolution)
+    found = components(raster)
+    slack = int(np.ceil(reach.clearance / resolution)) + 2
+    start = _labels_near(raster, found, setup.starts[:, :2], slack)
+    goal = _labels_near(raster, found, setup.goals, slack)
+    return np.flatnonzero((start != goal) | (start < 0))
+
+
+def _labels_near(raster: Raster, found: Components, points: Floats, slack: int) -> Ints:
+    """Return the labels (N,) of the points' cells, or of the nearest free cell at most ``slack`` cells
+    away."""
+    cells = cells_of(raster, points)
+    labels = labels_at(found, cells)
+    for robot in np.flatnonzero(labels < 0):
+        around = np.stack(np.meshgrid(*[np.arange(-slack, slack + 1)] * 2, indexing="ij"), axis=-1).reshape(
+            -1, 2
+        )
+        near = np.clip(cells[robot] + around, 0, np.array(raster.blocked.shape) - 1)
+        near_labels = labels_at(found, near)
+        if np.any(near_labels >= 0):
+            x = raster.x0 + (near[:, 1] + 0.5) * raster.resolution - points[robot, 0]
+            y = raster.y0 + (near[:, 0] + 0.5) * raster.resolution - points[robot, 1]
+            labels[robot] = near_labels[np.argmin(np.where(near_labels >= 0, np.hypot(x, y), np.inf))]
+    return labels
+
+
+def _check_finite(what: str, points: Floats) -> None:
+    bad = np.flatnonzero(~np.all(np.isfinite(points), axis=1))
+    if bad.size:
+        raise UnsolvableWorldError(f"robot {int(bad[0])}: its {what} {points[bad[0]].tolist()} is not finite")
+
+
+def _check_apart(what: str, points: Floats, radius: float) -> None:
+    """Look at each point's neighbours in bins of side 2 radius."""
+    bins: dict[tuple[int, int], list[int]] = {}
+    for robot, (column, row) in enumerate(np.floor(points / (2.0 * radius)).astype(np.int64).tolist()):
+        for near in ((column + i, row + j) for i in (-1, 0, 1) for j in (-1, 0, 1)):
+            for other in bins.get(near, []):
+                gap = float(np.hypot(*(points[robot] - points[other])))
+                if gap < 2.0 * radius:
+                    raise UnsolvableWorldError(
+                        f"robots {other} and {robot}: their {what}s are {gap:.3f} m apart, "
+                        f"less than two radii ({2.0 * radius:g} m)"
+                    )
+        bins.setdefault((column, row), []).append(robot)
+
+
+def _check_free(what: str, setup: Setup, points: Floats, radius: float) -> None:
+    blocked = blocked_points(compile_world(setup.world), points, radius)
+    if np.any(blocked):
+        robot = int(np.flatnonzero(blocked)[0])
+        raise UnsolvableWorldError(
+            f"robot {robot}: its {what} {np.round(points[robot], 3).tolist()} is in an obstacle or closer "
+            f"to one than its radius ({radius:g} m)"
+        )
