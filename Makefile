@@ -1,0 +1,69 @@
+# A clone needs Python >= 3.11 (with venv), make and a C compiler; everything else is installed, pinned, into .venv.
+
+PYTHON  ?= python3
+VENV    ?= .venv
+OUT     ?= runs/first
+WORKERS ?= 2
+
+BIN   := $(VENV)/bin
+PIP   := $(BIN)/python -m pip --disable-pip-version-check --no-input
+# --no-compile: byte code is made when a module is first used, which keeps the core environment below 400 MB.
+ADD   := $(PIP) install --quiet --no-deps --no-compile
+CODE  := src tests benchmarks examples
+
+# One folder of compiled kernels per state of src/: Numba refreshes a cached kernel when its own file changes,
+# but not when a function that it calls from another file does. tests/conftest.py computes the same name.
+export NUMBA_CACHE_DIR = $(CURDIR)/.numba_cache/$(shell cd src && find . -name '*.py' | LC_ALL=C sort | xargs sha256sum | sha256sum | cut -c1-16)
+
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.PHONY: help run test check bench setup setup-dev clean
+
+help: ## print this list
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
+
+run: setup ## set up and let 15 robots cross the forest (results in runs/first)
+	$(BIN)/swarmscope run --task T1 --planner nav-scope --robots 15 --seed 0 --out $(OUT)
+
+test: setup-dev ## set up, check and run all tests
+	@$(MAKE) --no-print-directory check
+	$(BIN)/python -m pytest -rs -n $(WORKERS) $(PYTEST_ARGS)
+
+check: setup-dev ## linter, strict types, import contract
+	$(BIN)/ruff check $(wildcard $(CODE))
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+bench: setup-dev ## measure speed against floors and peers
+	$(BIN)/python benchmarks/run_all.py
+
+setup: $(VENV)/.package ## install the package and its pinned core set only
+
+setup-dev: $(VENV)/.dev ## install what tests and checks need, too
+
+clean: ## remove the environment, caches and results
+	rm -rf $(VENV) runs build dist .numba_cache .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
+	find . -name __pycache__ -not -path './.git/*' -prune -exec rm -rf {} +
+	rm -rf src/*.egg-info
+
+# Each stamp is touched only after its step succeeded, so an interrupted step is done again.
+$(VENV)/.python:
+	@command -v $(PYTHON) >/dev/null || { echo "'$(PYTHON)' was not found: install Python 3.11 or newer, or say make PYTHON=/path/to/python3" >&2; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.version_info >= (3, 11) or sys.exit("swarmscope needs Python 3.11 or newer; $(PYTHON) is " + sys.version.split()[0] + ". Say which to use: make PYTHON=python3.12")'
+	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || { echo "$(PYTHON) has no venv module: install it (Debian, Ubuntu: apt-get install python3-venv)" >&2; exit 1; }
+	$(PYTHON) -m venv --clear $(VENV)
+	@touch $@
+
+$(VENV)/.core: requirements/core.lock $(VENV)/.python
+	$(ADD) -r requirements/core.lock
+	@touch $@
+
+$(VENV)/.package: pyproject.toml $(VENV)/.core
+	$(ADD) --no-build-isolation -e .
+	$(PIP) check
+	@touch $@
+
+$(VENV)/.dev: requirements/dev.lock $(VENV)/.package
+	$(ADD) -r requirements/dev.lock
+	$(PIP) check
+	@touch $@

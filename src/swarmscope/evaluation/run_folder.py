@@ -1,0 +1,299 @@
+"""The folder of one run: complete, or not there at all.
+
+Everything is written and synced in a sibling folder, ``metrics.json`` last, and then renamed into place.
+A process killed at any moment leaves the earlier result or the new one, and at worst a hidden sibling,
+which the next write to the same place removes.
+"""
+
+from __future__ import annotations
+
+import errno
+import fcntl
+import json
+import math
+import os
+import re
+import shutil
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+import numpy.typing as npt
+import yaml
+
+from swarmscope.errors import ConfigError, InputFileError, SwarmscopeError
+from swarmscope.sim.scan_files import read_npz
+
+CONFIG, WORLD, TRAJECTORY, METRICS = "config.yaml", "world.json", "trajectory.npz", "metrics.json"
+REQUIRED = frozenset({CONFIG, WORLD, TRAJECTORY, METRICS})
+RUN_FILES = REQUIRED | {"paths.png", "replay.html"}
+YAML_END = "...\n"
+
+
+def write_run(
+    out: Path,
+    config: Mapping[str, Any],
+    world: Mapping[str, Any],
+    trajectory: Mapping[str, npt.NDArray[Any]],
+    metrics: Mapping[str, Any],
+    extras: Callable[[Path], None] | None = None,
+) -> Path:
+    """Write a complete run folder at ``out`` and return its path; an earlier run there is replaced last.
+
+    ``extras`` is called with the unfinished folder to add the other ``RUN_FILES``. When anything fails,
+    nothing of the new run stays and the earlier run is as it was.
+    """
+    place = _place(out)
+    with _explained(place):
+        place.parent.mkdir(parents=True, exist_ok=True)
+        with _locked(place.parent):
+            _refuse_foreign(place)
+            _tidy_leftovers(place)
+        partial = place.with_name(f".{place.name}.partial-{os.getpid()}")
+        partial.mkdir()
+        try:
+            _write_all(partial, config, world, trajectory, metrics, extras)
+            with _locked(place.parent):
+                _publish(partial, place)
+        finally:
+            shutil.rmtree(partial, ignore_errors=True)
+    return place
+
+
+def check_out(out: Path) -> Path:
+    """Return the resolved ``out`` if a run may be written there, else raise ``ConfigError``.
+
+    Meant to be called before a run, too, so that a long one does not end in a refusal.
+    """
+    place = _place(out)
+    with _explained(place):
+        if place.parent.is_dir():
+            with _locked(place.parent):
+                _refuse_foreign(place)
+    return place
+
+
+def read_metrics(run_dir: Path) -> dict[str, Any]:
+    """Return the figures of a finished run; anything else raises ``InputFileError``."""
+    return _read_json(_finished(run_dir) / METRICS)
+
+
+def read_world(run_dir: Path) -> dict[str, Any]:
+    """Return the world of a finished run; anything else raises ``InputFileError``."""
+    return _read_json(_finished(run_dir) / WORLD)
+
+
+def read_trajectory(run_dir: Path) -> dict[str, npt.NDArray[Any]]:
+    """Return the arrays of a finished run; anything else raises ``InputFileError``."""
+    return read_npz(_finished(run_dir) / TRAJECTORY)
+
+
+def read_config(run_dir: Path) -> dict[str, Any]:
+    """Return the scenario of a finished run; anything else raises ``InputFileError``."""
+    path = _finished(run_dir) / CONFIG
+    text = _read_text(path)
+    if not text.endswith("\n" + YAML_END):
+        raise InputFileError(path, "torn: the end mark is missing")
+    try:
+        return _as_mapping(path, yaml.safe_load(text))
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        raise InputFileError(path, f"torn or foreign YAML ({type(error).__name__})") from None
+
+
+def _place(out: Path) -> Path:
+    place = Path(out).resolve()
+    if not place.name:
+        raise ConfigError(str(place), "is not a place for a run folder")
+    return place
+
+
+def _refuse_foreign(place: Path) -> None:
+    """Raise ``ConfigError`` unless there is nothing, an empty folder or a finished run at ``place``."""
+    if not place.exists():
+        return
+    if not place.is_dir():
+        raise ConfigError(str(place), "is a file; a run is written into a folder of its own")
+    names = {entry.name for entry in place.iterdir()}
+    foreign = sorted(names - RUN_FILES)
+    if foreign:
+        raise ConfigError(
+            str(place), f"holds '{foreign[0]}', which is no part of a run; refusing to overwrite it"
+        )
+    if names and not names >= REQUIRED:
+        raise ConfigError(str(place), f"holds '{min(names)}' but no finished run; refusing to overwrite it")
+
+
+def _write_all(
+    folder: Path,
+    config: Mapping[str, Any],
+    world: Mapping[str, Any],
+    trajectory: Mapping[str, npt.NDArray[Any]],
+    metrics: Mapping[str, Any],
+    extras: Callable[[Path], None] | None,
+) -> None:
+    (folder / CONFIG).write_text(_yaml_text(config), encoding="utf-8")
+    (folder / WORLD).write_text(_json_text(world), encoding="utf-8")
+    _write_npz(folder / TRAJECTORY, trajectory)
+    if extras is not None:
+        extras(folder)
+    names = {entry.name for entry in folder.iterdir()}
+    if not names <= RUN_FILES - {METRICS}:
+        raise ValueError(f"extras wrote {sorted(names - RUN_FILES)}; a run folder holds {sorted(RUN_FILES)}")
+    for name in names:
+        _sync(folder / name)
+    (folder / METRICS).write_text(_json_text(metrics), encoding="utf-8")
+    _sync(folder / METRICS)
+    _sync(folder)
+
+
+def _write_npz(path: Path, arrays: Mapping[str, npt.NDArray[Any]]) -> None:
+    """Write the arrays; the same arrays give the same bytes (sorted, C order, numpy's fixed date of 1980)."""
+    plain = {name: np.asarray(arrays[name], order="C") for name in sorted(arrays)}
+    for name, array in plain.items():
+        if array.dtype.hasobject:
+            raise ValueError(f"'{name}' holds Python objects; a run folder has no pickles")
+    with path.open("wb") as file:
+        np.savez_compressed(file, **cast("dict[str, Any]", plain))
+
+
+def _json_text(data: Mapping[str, Any]) -> str:
+    return json.dumps(_plain(data, finite=True), sort_keys=True, indent=1, allow_nan=False) + "\n"
+
+
+def _yaml_text(data: Mapping[str, Any]) -> str:
+    return yaml.safe_dump(_plain(data, finite=False), sort_keys=False, allow_unicode=True, explicit_end=True)
+
+
+def _plain(value: Any, *, finite: bool) -> Any:
+    """Return ``value`` in types that JSON and YAML know; with ``finite``, NaN and infinity become None."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item, finite=finite) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item, finite=finite) for item in value]
+    if isinstance(value, (np.ndarray, np.generic)):
+        return _plain(value.tolist(), finite=finite)
+    if isinstance(value, Path):
+        return str(value)
+    if finite and isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def _publish(partial: Path, place: Path) -> None:
+    """Rename ``partial`` to ``place``; an earlier run is moved aside first and comes back when that fails."""
+    aside = place.with_name(f".{place.name}.old-{os.getpid()}")
+    replaced = place.exists()
+    if replaced:
+        place.rename(aside)
+    try:
+        partial.rename(place)
+    except BaseException:
+        if replaced:
+            aside.rename(place)
+        raise
+    with suppress(OSError):  # the run is in place; only its safety in a power cut is less sure
+        _sync(place.parent)
+    shutil.rmtree(aside, ignore_errors=True)
+
+
+def _tidy_leftovers(place: Path) -> None:
+    """Remove what killed writers left beside ``place``; a run that one had moved aside comes back first."""
+    for kind in ("old", "partial"):
+        for leftover in _leftovers(place, kind):
+            if kind == "old" and not place.exists():
+                leftover.rename(place)
+            else:
+                shutil.rmtree(leftover, ignore_errors=True)
+
+
+def _leftovers(place: Path, kind: str) -> list[Path]:
+    """Return the hidden siblings that no living writer owns; this process is only about to start writing."""
+    pattern = re.compile(rf"\.{re.escape(place.name)}\.{kind}-(\d+)")
+    matches = ((pattern.fullmatch(entry.name), entry) for entry in place.parent.iterdir())
+    return sorted(entry for match, entry in matches if match and not _other_is_alive(int(match[1])))
+
+
+def _other_is_alive(pid: int) -> bool:
+    if pid == os.getpid():
+        return False
+    try:
+        os.kill(pid, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:
+        return True
+    return True
+
+
+def _sync(path: Path) -> None:
+    """Force a file or folder to the disk."""
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+@contextmanager
+def _locked(folder: Path) -> Iterator[None]:
+    """Let one writer at a time rename inside ``folder``; without locks on a file system that has none."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        with suppress(OSError):
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(descriptor)
+
+
+@contextmanager
+def _explained(place: Path) -> Iterator[None]:
+    """Turn a full disk, a missing permission and the like into an error that names the place."""
+    try:
+        yield
+    except OSError as error:
+        reason = "the disk is full" if error.errno == errno.ENOSPC else error.strerror or str(error)
+        raise SwarmscopeError(
+            f"{place}: cannot write the run: {reason}; an earlier run there is unchanged"
+        ) from error
+
+
+def _finished(run_dir: Path) -> Path:
+    """Return ``run_dir`` if it holds a finished run."""
+    folder = Path(run_dir)
+    if not folder.is_dir():
+        raise InputFileError(
+            folder, "is a file, not a run folder" if folder.exists() else "no such run folder"
+        )
+    if not (folder / METRICS).is_file():
+        raise InputFileError(folder, f"no finished run: it has no {METRICS}, which is written last")
+    for name in sorted(REQUIRED):
+        path = folder / name
+        if not path.is_file() or path.stat().st_size == 0:
+            raise InputFileError(path, "is missing or empty: the run folder is torn")
+    return folder
+
+
+def _read_text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except UnicodeDecodeError:
+        raise InputFileError(path, "is not text: torn or foreign") from None
+    except OSError as error:
+        raise InputFileError(path, error.strerror or "cannot be read") from None
+
+
+def _read_json(path: Path) -> dict[str, Any]:
+    text = _read_text(path)
+    try:
+        return _as_mapping(path, json.loads(text))
+    except (ValueError, RecursionError):
+        raise InputFileError(path, "torn or foreign JSON") from None
+
+
+def _as_mapping(path: Path, data: object) -> dict[str, Any]:
+    if not isinstance(data, dict):
+        raise InputFileError(path, "does not hold a table of keys and values: foreign")
+    return data
