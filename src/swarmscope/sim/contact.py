@@ -31,7 +31,7 @@ def static_clearance(world: World, ax: float, ay: float, bx: float, by: float, l
     return best
 
 
-@jit
+@jit_inline
 def _circle_clearance(world: World, ax: float, ay: float, bx: float, by: float, best: float) -> float:
     bins, circles = world.bins, world.circles
     reach = best + world.radius_max
@@ -47,7 +47,7 @@ def _circle_clearance(world: World, ax: float, ay: float, bx: float, by: float, 
     return best
 
 
-@jit
+@jit_inline
 def _segment_clearance(world: World, ax: float, ay: float, bx: float, by: float, best: float) -> float:
     bins, segments = world.bins, world.segments
     reach = best + 0.5 * PIECE_M
@@ -63,7 +63,7 @@ def _segment_clearance(world: World, ax: float, ay: float, bx: float, by: float,
     return best
 
 
-@jit
+@jit_inline
 def _inside_polygon(world: World, x: float, y: float) -> bool:
     """Return whether the point lies in a polygon; the far end need not be asked, edges in between are."""
     bins, vertices = world.bins, world.vertices
@@ -85,7 +85,7 @@ def _inside_polygon(world: World, x: float, y: float) -> bool:
     return False
 
 
-@jit
+@jit_inline
 def _grid_clearance(world: World, ax: float, ay: float, bx: float, by: float, best: float) -> float:
     """Lower ``best`` by the solid cells near the path, in cells; free ones are skipped by ``solid_gap``."""
     scale = 1.0 / world.solid_resolution
@@ -114,7 +114,7 @@ def _grid_clearance(world: World, ax: float, ay: float, bx: float, by: float, be
     return min(best, reach * world.solid_resolution)
 
 
-@jit
+@jit_inline
 def _cell_distance(ax: float, ay: float, bx: float, by: float, x: float, y: float) -> float:
     """Return the distance between path a-b and the unit square whose lower left corner is x, y."""
     if _meets_square(ax, ay, bx, by, x, y):

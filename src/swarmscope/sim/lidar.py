@@ -40,7 +40,7 @@ class Beams(NamedTuple):
 
 
 def make_beams(beams: int, fov_rad: float, range_max_m: float) -> Beams:
-    """Return ``beams`` directions over ``fov_rad``: a full circle from -pi, or a field with both edges included."""
+    """Return ``beams`` directions over ``fov_rad``: a full circle from -pi, or a field with its edges."""
     if beams < 2:
         raise ConfigError("lidar.beams", f"must be at least 2, got {beams}")
     if not 0.0 < fov_rad <= 2.0 * math.pi + 1e-9:
@@ -169,7 +169,7 @@ def _rough_angle(x: float, y: float) -> float:
 
 @jit_inline
 def _beam_offsets(start: float, width: float, beams: Beams) -> tuple[float, float]:
-    """Return where directions start .. start + width [rad] lie, counted in beams, the first within one turn."""
+    """Return where directions start .. start + width [rad] lie, counted in beams; the first in one turn."""
     offset = start - beams.angle_min
     if offset < 0.0:
         offset += 2.0 * math.pi
@@ -272,7 +272,7 @@ def _clip_to_grid(
 
 @jit_inline
 def _cell_after(position: float, cell: int, k: int, d: float) -> int:
-    """Return the cell of ``position`` along one axis, within the free square and never against direction d."""
+    """Return the cell of ``position`` along one axis, in the free square and never against direction d."""
     if d >= 0.0:
         return cell + int(min(max(position - cell, 0.0), k - 1.0))
     return cell - int(min(max(math.ceil(cell - position), 0.0), k - 1.0))

@@ -34,9 +34,9 @@ def packaged_map(name: str) -> Path:
 def load_map(yaml_path: str | Path) -> Grid:
     """Read a map_server / nav2 map; image row 0 is the top.
 
-    With p = (255 - grey) / 255 (grey / 255 with ``negate``), a cell is occupied if p >= occupied_thresh, free if
-    p <= free_thresh, else unknown; all but free are solid.
-    Only ``mode: trinary`` and an origin that is not rotated are supported.
+    With p = (255 - grey) / 255 (grey / 255 with ``negate``), a cell is occupied if p >= occupied_thresh, free
+    if p <= free_thresh, else unknown; all but free are solid. Only ``mode: trinary`` and an
+    origin that is not rotated are supported.
     """
     path = Path(yaml_path)
     settings = _read_yaml(path)
@@ -81,7 +81,8 @@ def save_map(grid: Grid, yaml_path: str | Path) -> None:
 def load_movingai(path: str | Path, resolution: float = 1.0) -> Grid:
     """Read a Moving AI ``.map`` (type octile), first row at the top.
 
-    '.', 'G', 'S' are free, '@', 'O', 'T', 'W' solid. One character becomes one cell of ``resolution`` [m]; the lower left corner of the map is (0, 0).
+    '.', 'G', 'S' are free, '@', 'O', 'T', 'W' solid. One character becomes one cell of ``resolution``
+    [m]; the lower left corner of the map is (0, 0).
     """
     path = Path(path)
     lines = _read_text(path).splitlines()

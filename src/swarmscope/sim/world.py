@@ -17,7 +17,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_valida
 from swarmscope._jit import jit, jit_inline
 
 PIECE_M = 1.0
-"""Walls and polygon edges are cut into pieces of at most this length [m]: a look-up finds them by midpoint."""
+"""Walls and polygon edges are cut into pieces no longer than this [m]: a look-up finds them by midpoint."""
 
 BIN_M = 1.0
 """Side of a look-up bin [m]; larger only in worlds wider than `BINS_PER_SIDE` of them."""
