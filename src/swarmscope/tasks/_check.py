@@ -9,15 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarmscope.errors import UnsolvableWorldError
-from swarmscope.sim.world import compile_world
+from swarmscope.sim.contact import static_clearance
+from swarmscope.sim.world import World, compile_world
 from swarmscope.tasks._contract import Setup, check_robots
 from swarmscope.tasks._occupancy import (
-    Components,
-    Raster,
-    blocked_points,
-    cells_of,
     components,
     domain_of,
+    free_cells_near,
     labels_at,
     rasterise,
 )
@@ -56,8 +54,9 @@ def check_setup(setup: Setup, radius: float) -> None:
     _check_finite("goal", goals)
     _check_apart("start", starts[:, :2], radius)
     _check_apart("goal", goals, radius)
-    _check_free("start", setup, starts[:, :2], radius)
-    _check_free("goal", setup, goals, radius)
+    world = compile_world(setup.world)
+    _check_free("start", world, starts[:, :2], radius)
+    _check_free("goal", world, goals, radius)
     bad = unreachable(setup, Reach(radius))
     if bad.size:
         raise UnsolvableWorldError(
@@ -78,27 +77,9 @@ def unreachable(setup: Setup, reach: Reach) -> Ints:
     raster = rasterise(compile_world(setup.world), reach.radius + reach.clearance, domain, resolution)
     found = components(raster)
     slack = int(np.ceil(reach.clearance / resolution)) + 2
-    start = _labels_near(raster, found, setup.starts[:, :2], slack)
-    goal = _labels_near(raster, found, setup.goals, slack)
+    start = labels_at(found, free_cells_near(raster, setup.starts, slack))
+    goal = labels_at(found, free_cells_near(raster, setup.goals, slack))
     return np.flatnonzero((start != goal) | (start < 0))
-
-
-def _labels_near(raster: Raster, found: Components, points: Floats, slack: int) -> Ints:
-    """Return the labels (N,) of the points' cells, or of the nearest free cell at most ``slack`` cells
-    away."""
-    cells = cells_of(raster, points)
-    labels = labels_at(found, cells)
-    for robot in np.flatnonzero(labels < 0):
-        around = np.stack(np.meshgrid(*[np.arange(-slack, slack + 1)] * 2, indexing="ij"), axis=-1).reshape(
-            -1, 2
-        )
-        near = np.clip(cells[robot] + around, 0, np.array(raster.blocked.shape) - 1)
-        near_labels = labels_at(found, near)
-        if np.any(near_labels >= 0):
-            x = raster.x0 + (near[:, 1] + 0.5) * raster.resolution - points[robot, 0]
-            y = raster.y0 + (near[:, 0] + 0.5) * raster.resolution - points[robot, 1]
-            labels[robot] = near_labels[np.argmin(np.where(near_labels >= 0, np.hypot(x, y), np.inf))]
-    return labels
 
 
 def _check_finite(what: str, points: Floats) -> None:
@@ -122,11 +103,10 @@ def _check_apart(what: str, points: Floats, radius: float) -> None:
         bins.setdefault((column, row), []).append(robot)
 
 
-def _check_free(what: str, setup: Setup, points: Floats, radius: float) -> None:
-    blocked = blocked_points(compile_world(setup.world), points, radius)
-    if np.any(blocked):
-        robot = int(np.flatnonzero(blocked)[0])
-        raise UnsolvableWorldError(
-            f"robot {robot}: its {what} {np.round(points[robot], 3).tolist()} is in an obstacle or closer "
-            f"to one than its radius ({radius:g} m)"
-        )
+def _check_free(what: str, world: World, points: Floats, radius: float) -> None:
+    for robot, (x, y) in enumerate(points.tolist()):
+        if static_clearance(world, x, y, x, y, 2.0 * radius) <= radius:
+            raise UnsolvableWorldError(
+                f"robot {robot}: its {what} ({x:.3f}, {y:.3f}) is in an obstacle or closer to one "
+                f"than its radius ({radius:g} m)"
+            )

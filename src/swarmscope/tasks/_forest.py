@@ -25,7 +25,8 @@ from swarmscope.sim.world import Circle, WorldSpec
 from swarmscope.tasks._check import Reach, unreachable
 from swarmscope.tasks._contract import Setup
 
-MARGIN_M = 0.60  # between a tree's surface and the centre of a start or goal
+MARGIN_M = 0.60  # between a tree's surface and the centre of a start or goal, at least
+ROOM_M = 0.30  # the same beyond a robot's radius, for robots wider than 0.30 m
 SPACING_M = 1.0  # between robots when there are several ranks, and between ranks
 LINE_OFFSET_M = 0.5  # from the square's side to the first rank of starts
 RING_OFFSET_M = 0.7  # from the disc's rim to the first ring of starts
@@ -120,11 +121,13 @@ def plant(seed: int, places: Places, radius: float, options: ForestOptions) -> S
 
     Draw d uses the random stream (seed, purpose, d); the first solvable of at most 20 redraws is taken.
     """
-    reach = Reach(radius)
+    reach, margin = Reach(radius), max(MARGIN_M, radius + ROOM_M)
     why = ""
     for draw in range(REDRAWS + 1):
         rng = np.random.default_rng([seed, TREES, draw])
-        circles = [Circle(center=(x, y), radius=r) for x, y, r in _trees(rng, places, options).tolist()]
+        circles = [
+            Circle(center=(x, y), radius=r) for x, y, r in _trees(rng, places, options, margin).tolist()
+        ]
         setup = Setup(WorldSpec(obstacles=circles, bounds=_bounds(places)), places.starts, places.goals)
         bad = unreachable(setup, reach)
         if bad.size == 0:
@@ -151,7 +154,7 @@ def _ring_holds(disc: float, ring: int, step: float) -> int:
     return max(1, math.floor(2.0 * math.pi * (disc + RING_OFFSET_M + ring * step) / step))
 
 
-def _trees(rng: np.random.Generator, places: Places, options: ForestOptions) -> Floats:
+def _trees(rng: np.random.Generator, places: Places, options: ForestOptions, margin: float) -> Floats:
     """Return the trees (C, 3) x, y, radius [m]."""
     if not 0.0 < options.radius_min <= options.radius_max:
         raise ConfigError("radius_min, radius_max", "need 0 < radius_min <= radius_max")
@@ -160,8 +163,8 @@ def _trees(rng: np.random.Generator, places: Places, options: ForestOptions) -> 
     count = round(options.density * places.area)
     radii = rng.uniform(options.radius_min, options.radius_max, count)
     points = np.vstack([places.starts[:, :2], places.goals])
-    cell = 2.0 * max(MARGIN_M, options.radius_max)
-    placer = _Placer(places, points, cell)
+    cell = 2.0 * max(margin, options.radius_max)
+    placer = _Placer(places, points, margin, cell)
     trees = np.zeros((count, 3))
     trees[:, 2] = radii
     tries, planted = 0, 0
@@ -180,13 +183,13 @@ def _trees(rng: np.random.Generator, places: Places, options: ForestOptions) -> 
 class _Placer:
     """Discs that keep off each other: bins of the plane with the discs whose centres they hold."""
 
-    def __init__(self, places: Places, points: Floats, cell: float) -> None:
+    def __init__(self, places: Places, points: Floats, margin: float, cell: float) -> None:
         low = np.minimum(points.min(axis=0), -places.extent if places.is_disc else 0.0)
         high = np.maximum(points.max(axis=0), places.extent)
         self.places, self.low, self.cell = places, low, cell
         columns, rows = (np.floor((high - low) / cell) + 1).astype(int)
         self.head = np.full((int(rows), int(columns)), -1, dtype=np.int64)
-        self.keep_off = np.column_stack([points, np.full(len(points), MARGIN_M)])
+        self.keep_off = np.column_stack([points, np.full(len(points), margin)])
         self.chain: Ints = np.zeros(0, dtype=np.int64)
 
     def spread(self, unit: Floats) -> Floats:

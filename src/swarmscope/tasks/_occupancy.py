@@ -57,19 +57,13 @@ def rasterise(
     rows = max(1, math.ceil(domain[3] / resolution) - first_row)
     x0, y0 = first_column * resolution, first_row * resolution
     blocked = np.zeros((rows, columns), dtype=np.uint8)
-    _paint_all(blocked, x0, y0, resolution, world, inflate)
+    _paint_circles(blocked, x0, y0, resolution, world.circles, inflate)
+    _paint_segments(blocked, x0, y0, resolution, world.segments, inflate)
+    for first, last in pairwise(world.vertex_start):
+        _paint_polygon(blocked, x0, y0, resolution, world.vertices[first:last])
+    left, bottom = float(world.solid_origin[0]), float(world.solid_origin[1])
+    _paint_solid(blocked, x0, y0, resolution, world.solid, left, bottom, world.solid_resolution, inflate)
     return Raster(blocked, x0, y0, resolution)
-
-
-def blocked_points(world: World, points: Floats, inflate: float) -> NDArray[np.bool_]:
-    """Say of each point (N, 2) [m] whether it is closer than ``inflate`` to an obstacle: a grid of one cell
-    each."""
-    near = np.zeros(len(points), dtype=bool)
-    for k, (x, y) in enumerate(points.tolist()):
-        cell = np.zeros((1, 1), dtype=np.uint8)
-        _paint_all(cell, x - 0.5, y - 0.5, 1.0, world, inflate)
-        near[k] = cell[0, 0] == 1
-    return near
 
 
 def domain_of(
@@ -92,6 +86,32 @@ def cells_of(raster: Raster, points: Floats) -> Ints:
     return cells.astype(np.int64)
 
 
+def free_cells_near(raster: Raster, points: Floats, steps: int) -> Ints:
+    """Return the cells (N, 2) of the points, or the free cell with the nearest centre at most ``steps``
+    cells away.
+
+    Where no such cell is free, the point's own (blocked) cell is returned.
+    """
+    cells = cells_of(raster, points)
+    around = np.stack(np.meshgrid(*[np.arange(-steps, steps + 1)] * 2, indexing="ij"), axis=-1).reshape(-1, 2)
+    for k in np.flatnonzero(raster.blocked[cells[:, 0], cells[:, 1]]):
+        near = np.clip(cells[k] + around, 0, np.array(raster.blocked.shape) - 1)
+        away = centres_of(raster, near) - points[k, :2]
+        distance = np.where(
+            raster.blocked[near[:, 0], near[:, 1]] == 0, np.hypot(away[:, 0], away[:, 1]), np.inf
+        )
+        if np.isfinite(distance.min()):
+            cells[k] = near[np.argmin(distance)]
+    return cells
+
+
+def centres_of(raster: Raster, cells: Ints) -> Floats:
+    """Return the centres x, y (N, 2) [m] of the cells (N, 2) row, column."""
+    x = raster.x0 + (cells[:, 1] + 0.5) * raster.resolution
+    y = raster.y0 + (cells[:, 0] + 0.5) * raster.resolution
+    return np.stack([x, y], axis=1)
+
+
 def components(raster: Raster) -> Components:
     """Label the free cells: two have the same label when one can be reached from the other."""
     counts = _count_runs(raster.blocked)
@@ -112,15 +132,6 @@ def largest_label(found: Components) -> int:
         return -1
     sizes = np.bincount(found.label, weights=(found.run_end - found.run_start).astype(np.float64))
     return int(np.argmax(sizes))
-
-
-def _paint_all(blocked: Bytes, x0: float, y0: float, resolution: float, world: World, inflate: float) -> None:
-    _paint_circles(blocked, x0, y0, resolution, world.circles, inflate)
-    _paint_segments(blocked, x0, y0, resolution, world.segments, inflate)
-    for first, last in pairwise(world.vertex_start):
-        _paint_polygon(blocked, x0, y0, resolution, world.vertices[first:last])
-    left, bottom = float(world.solid_origin[0]), float(world.solid_origin[1])
-    _paint_solid(blocked, x0, y0, resolution, world.solid, left, bottom, world.solid_resolution, inflate)
 
 
 @jit
