@@ -1,0 +1,195 @@
+"""The last check before the wheels, the same for every planner: braking distance along the swept footprint.
+
+A command is let through only if the robot, having executed it until the next tick (plus the age of its scan),
+can still brake to a stop without its disc coming closer to a return than the clearance (GIWT 1-2; the braking
+distance is Nav-SCOPE's s_b). Other robots move: each may use only its half of the gap between two robots, and
+keeps its braking distance twice, so that after both have moved each can still stop in its half (docs/safety.md
+has the argument). If nothing passes, the robot brakes straight on, which the previous tick has shown to be free.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from swarmscope._jit import jit, jit_inline
+from swarmscope.geometry import point_segment_distance
+from swarmscope.onboard.control.unicycle import steer
+from swarmscope.onboard.percept import PEERS, Rig
+from swarmscope.onboard.sharing.tracks import neighbour_reach
+
+STEPS = 4
+"""Straight pieces that stand for the arc driven until the next tick."""
+FRACTIONS = (1.0, 0.8, 0.6, 0.4, 0.2, 0.1, 0.0)
+PIECES = STEPS + 1
+
+
+@jit
+def guard(
+    ranges: np.ndarray, percept: np.ndarray, shared: np.ndarray, decision: np.ndarray, near: np.ndarray, rig: Rig
+) -> bool:
+    """Lower ``decision``'s speed until it is safe; return whether it had to. ``near (M + 1,) int16`` is scratch.
+
+    ``ranges (M,)`` is the raw scan [m]: invalid beams (NaN, below range_min) forbid motion towards them.
+    """
+    body = rig.body
+    v0 = percept["speed"]
+    w = min(body.w_max, max(-body.w_max, decision["w"]))
+    wanted = min(body.v_max, max(0.0, decision["v"]))
+    if not (math.isfinite(wanted) and math.isfinite(w)):
+        wanted, w = 0.0, 0.0
+    count = _near_beams(ranges, percept["dt_s"], rig, near)
+    for fraction in FRACTIONS:
+        v = wanted * fraction
+        if _passes(ranges, percept, shared, v0, v, w, near, count, rig):
+            decision["v"], decision["w"] = v, w
+            return fraction < 1.0
+    decision["v"], decision["w"] = 0.0, 0.0 if v0 > 1e-6 else w
+    return True
+
+
+@jit_inline
+def _near_beams(ranges: np.ndarray, dt: float, rig: Rig, near: np.ndarray) -> int:
+    """Collect the beams that could matter within this tick's motion and the braking after it; return how many."""
+    body = rig.body
+    reach = body.v_max * (dt + rig.latency) + 2.0 * body.v_max * body.v_max / body.a_max
+    limit = body.radius + 2.0 * rig.clearance + reach
+    count = 0
+    for n in range(rig.sensor.beams):
+        if not ranges[n] >= limit:
+            near[count] = n
+            count += 1
+    return count
+
+
+@jit
+def _passes(
+    ranges: np.ndarray,
+    percept: np.ndarray,
+    shared: np.ndarray,
+    v0: float,
+    v: float,
+    w: float,
+    near: np.ndarray,
+    count: int,
+    rig: Rig,
+) -> bool:
+    """Tell whether commanding (v, w) from speed ``v0`` keeps clear of every near beam and every neighbour."""
+    body = rig.body
+    dt = percept["dt_s"]
+    x0, y0 = v0 * rig.latency, 0.0
+    yaw = 0.0
+    step = dt / STEPS
+    speed = v0
+    x1, y1, x2, y2, x3, y3, x4, y4 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    x, y = x0, y0
+    for k in range(STEPS):
+        change = min(body.a_max * step, max(-body.a_max * step, v - speed))
+        way = (speed + 0.5 * change) * step
+        speed += change
+        x += way * math.cos(yaw + 0.5 * w * step)
+        y += way * math.sin(yaw + 0.5 * w * step)
+        yaw += w * step
+        if k == 0:
+            x1, y1 = x, y
+        elif k == 1:
+            x2, y2 = x, y
+        elif k == 2:
+            x3, y3 = x, y
+        else:
+            x4, y4 = x, y
+    brake = speed * speed / (2.0 * body.a_max)
+    x5, y5 = x + brake * math.cos(yaw), y + brake * math.sin(yaw)
+    if x5 * x5 + y5 * y5 + brake < 1e-10 and v0 < 1e-6:
+        return True
+    if not _clear_of_tracks(percept, shared, x4, y4, x5, y5, brake, rig):
+        return False
+    for k in range(count):
+        n = near[k]
+        s = ranges[n]
+        if not s >= rig.sensor.range_min:
+            s = body.radius + rig.clearance
+        px, py = s * rig.cos[n], s * rig.sin[n]
+        gap = _point_gap(percept, shared, px, py, rig)
+        if gap and not _in_own_half(px, py, s, x4, y4, x5, y5, brake, rig):
+            return False
+        need = body.radius + rig.clearance
+        if s < need:  # already too close: never closer
+            need = s - 1e-6
+        if (
+            point_segment_distance(px, py, 0.0, 0.0, x1, y1) < need
+            or point_segment_distance(px, py, x1, y1, x2, y2) < need
+            or point_segment_distance(px, py, x2, y2, x3, y3) < need
+            or point_segment_distance(px, py, x3, y3, x4, y4) < need
+            or point_segment_distance(px, py, x4, y4, x5, y5) < need
+        ):
+            return False
+    return True
+
+
+@jit_inline
+def _point_gap(percept: np.ndarray, shared: np.ndarray, px: float, py: float, rig: Rig) -> bool:
+    """Tell whether the return at (px, py), body frame, may belong to a neighbour."""
+    c, s = math.cos(percept["compass"]), math.sin(percept["compass"])
+    gx, gy = c * px - s * py, s * px + c * py
+    for t in range(PEERS):
+        if shared["track_id"][t] < 0:
+            continue
+        ex, ey = gx - shared["track_x"][t], gy - shared["track_y"][t]
+        reach = neighbour_reach(math.sqrt(shared["track_x"][t] ** 2 + shared["track_y"][t] ** 2), rig)
+        if ex * ex + ey * ey <= reach * reach:
+            return True
+    return False
+
+
+@jit_inline
+def _in_own_half(
+    px: float, py: float, s: float, x4: float, y4: float, x5: float, y5: float, brake: float, rig: Rig
+) -> bool:
+    """Tell whether a motion that is at (x4, y4) at the next tick and could stop at (x5, y5) keeps to its half.
+
+    (px, py) is the nearest known point of a neighbour's body at range ``s``; braking counts twice.
+    """
+    if s <= 1e-6:
+        return x5 * x5 + y5 * y5 < 1e-9
+    nx, ny = px / s, py / s
+    towards = max(x4 * nx + y4 * ny, x5 * nx + y5 * ny)
+    if towards <= 1e-6:
+        return True
+    return towards + brake <= 0.5 * (s - rig.body.radius) - rig.clearance
+
+
+@jit_inline
+def _clear_of_tracks(
+    percept: np.ndarray, shared: np.ndarray, x4: float, y4: float, x5: float, y5: float, brake: float, rig: Rig
+) -> bool:
+    """Apply the half-gap rule to every tracked neighbour, seen now or remembered."""
+    c, s = math.cos(percept["compass"]), math.sin(percept["compass"])
+    for t in range(PEERS):
+        if shared["track_id"][t] < 0:
+            continue
+        x = c * shared["track_x"][t] + s * shared["track_y"][t]
+        y = c * shared["track_y"][t] - s * shared["track_x"][t]
+        d = math.sqrt(x * x + y * y)
+        error = rig.sensor.position_sigma * d
+        surface = d - rig.body.radius - error
+        if surface > 4.0 * rig.body.radius + 1.0 or d < 1e-6:
+            continue
+        scale = surface / d
+        if not _in_own_half(x * scale, y * scale, max(surface, 1e-6), x4, y4, x5, y5, brake, rig):
+            return False
+    return True
+
+
+@jit
+def halt(decision: np.ndarray) -> None:
+    """Ask for standing still."""
+    decision["v"], decision["w"] = 0.0, 0.0
+
+
+@jit
+def head_for(decision: np.ndarray, percept: np.ndarray, heading: float, speed: float, rig: Rig) -> None:
+    """Ask for driving towards ``heading`` (body frame) at ``speed`` once turned."""
+    decision["heading"] = heading
+    decision["v"], decision["w"] = steer(heading, speed, rig.body.w_max, percept["dt_s"])

@@ -1,0 +1,111 @@
+"""Features of a scan: the extrema of the filtered scan, Nav-SCOPE (7), and their reconstruction."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from swarmscope._jit import jit, jit_inline
+from swarmscope.geometry import TWO_PI
+
+FLAT = 1e-5
+"""Change from beam to beam, as a fraction of the range, below which the filtered scan counts as flat."""
+
+
+@jit
+def extrema(
+    filtered: np.ndarray,
+    safe: np.ndarray,
+    angle_min: float,
+    increment: float,
+    wraps: bool,
+    range_max: float,
+    angles: np.ndarray,
+    distances: np.ndarray,
+) -> int:
+    """Write the masked extrema of ``filtered (M,)`` (7) into ``angles`` [rad], ``distances`` [m]; return how many.
+
+    A sign change of the first difference marks an extremum; a plateau counts once, at its middle. Extrema in
+    directions that are not safe are left out (gaps too narrow for the robot). Ascending angles, sensor frame.
+    """
+    beams = filtered.size
+    flat = FLAT * range_max
+    start = 0
+    steps = beams if wraps else beams - 1
+    if wraps:  # begin just after a slope, so that no plateau is cut in two
+        while start < beams and abs(filtered[(start + 1) % beams] - filtered[start]) <= flat:
+            start += 1
+        if start == beams:
+            return 0
+    rising = 0
+    last_slope = start
+    count = 0
+    for k in range(steps + (1 if wraps else 0)):
+        n = (start + k) % beams
+        change = filtered[(n + 1) % beams] - filtered[n]
+        if abs(change) <= flat:
+            continue
+        sign = 1 if change > 0.0 else -1
+        if rising != 0 and sign != rising:
+            top = last_slope + 1 + (start + k - last_slope - 1) // 2
+            beam = top % beams
+            if safe[beam] and count < angles.size:
+                angles[count] = angle_min + beam * increment
+                distances[count] = filtered[beam]
+                count += 1
+        rising = sign
+        last_slope = start + k
+    _sort_by_angle(angles, distances, count)
+    return count
+
+
+@jit_inline
+def _sort_by_angle(angles: np.ndarray, distances: np.ndarray, count: int) -> None:
+    """Sort the first ``count`` pairs by angle, in place (insertion sort: a handful of pairs)."""
+    for i in range(1, count):
+        angle, distance = angles[i], distances[i]
+        j = i - 1
+        while j >= 0 and angles[j] > angle:
+            angles[j + 1], distances[j + 1] = angles[j], distances[j]
+            j -= 1
+        angles[j + 1], distances[j + 1] = angle, distance
+
+
+@jit
+def align_features(
+    angles: np.ndarray, distances: np.ndarray, count: int, turn: float, out_angles: np.ndarray, out_distances: np.ndarray
+) -> None:
+    """Write the features turned by ``turn`` [rad] into the out arrays: angles in [0, 2 pi), ascending."""
+    for j in range(count):
+        angle = angles[j] + turn
+        out_angles[j] = angle - TWO_PI * math.floor(angle / TWO_PI)
+        out_distances[j] = distances[j]
+    _sort_by_angle(out_angles, out_distances, count)
+
+
+@jit
+def reconstruct(angles: np.ndarray, distances: np.ndarray, count: int, phi: float, chords: bool) -> float:
+    """Return the reconstructed distance at ``phi`` in [0, 2 pi) from features sorted in [0, 2 pi) (Nav-SCOPE IV-B).
+
+    Linear in the angle between consecutive features, or along the polygon's chord (``chords``; readings 8).
+    0 without features, their distance with one.
+    """
+    if count == 0:
+        return 0.0
+    if count == 1:
+        return distances[0]
+    right = 0
+    while right < count and angles[right] <= phi:
+        right += 1
+    left = right - 1
+    a = angles[left] if left >= 0 else angles[count - 1] - TWO_PI
+    d_a = distances[left] if left >= 0 else distances[count - 1]
+    b = angles[right] if right < count else angles[0] + TWO_PI
+    d_b = distances[right] if right < count else distances[0]
+    if b - a <= 1e-12:
+        return d_b
+    if chords and b - a < math.pi:
+        across = d_a * math.sin(phi - a) + d_b * math.sin(b - phi)
+        return d_a * d_b * math.sin(b - a) / across if across > 1e-12 else 0.0
+    return d_a + (d_b - d_a) * (phi - a) / (b - a)

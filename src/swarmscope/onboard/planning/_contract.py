@@ -1,0 +1,89 @@
+"""What a planner file defines, the states and reasons that planners share, and how planners are found.
+
+A planner is one file of this folder (or an entry point of group ``swarmscope.planners``) that defines ``NAME``,
+``SUMMARY``, ``NEEDS`` (what it is given), ``Params`` (a NamedTuple with defaults), ``MEMORY`` (a dtype),
+``new_memory(robots)`` and ``step_all(first, last, ...)`` (see ``nav_scope``): the compiled loop that calls
+``tick.begin``, the planner's own ``decide`` and ``tick.finish`` for each robot.
+"""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from types import ModuleType
+from typing import Any
+
+from swarmscope.errors import UnknownNameError
+
+STATE_NAMES = ("advance", "decide", "follow", "yield", "arrived", "escape", "crashed")
+ADVANCE, DECIDE, FOLLOW, YIELD, ARRIVED, ESCAPE, CRASHED = range(7)
+
+REASON_NAMES = (
+    "target direction is safe",
+    "final approach: the way to the goal is free",
+    "waits for the answers of neighbours",
+    "obstacle ahead: chose a side with the neighbours' features",
+    "obstacle ahead: chose a side alone",
+    "follows the obstacle on the chosen side",
+    "dead end: no safe direction, uses the narrower gaps that its body fits through",
+    "loop noticed: follows the border until closer to the goal than ever",
+    "no way out in sight: moves away from the nearest obstacle",
+    "waits for a neighbour to pass",
+    "stands still: no direction is free",
+    "arrived at the goal",
+    "guard: slowed down to keep its braking distance",
+    "collided",
+)
+(
+    R_FREE,
+    R_FINAL,
+    R_ANSWERS,
+    R_FUSED,
+    R_ALONE,
+    R_FOLLOW,
+    R_DEAD_END,
+    R_LOOP,
+    R_LOST,
+    R_YIELD,
+    R_BLOCKED_WAIT,
+    R_ARRIVED,
+    R_GUARD,
+    R_COLLIDED,
+) = range(14)
+
+
+def planner_names() -> list[str]:
+    """Return the names of all planners in this folder."""
+    import swarmscope.onboard.planning as folder
+
+    files = (m.name for m in pkgutil.iter_modules(folder.__path__))
+    return sorted(str(_load(f).NAME) for f in files if f not in NOT_PLANNERS and not f.startswith("_"))
+
+
+NOT_PLANNERS = frozenset({"fields", "fusion"})
+"""Modules of this folder that planners share."""
+
+
+def load_planner(name: str) -> ModuleType:
+    """Return the module of planner ``name``; raises UnknownNameError with the nearest name."""
+    file = name.replace("-", "_")
+    if name == file.replace("_", "-") and file not in NOT_PLANNERS and not file.startswith("_"):
+        try:
+            return _load(file)
+        except ModuleNotFoundError as error:
+            if error.name != f"swarmscope.onboard.planning.{file}":
+                raise
+    raise UnknownNameError("planner", name, planner_names())
+
+
+def make_params(planner: ModuleType, values: dict[str, Any]) -> Any:
+    """Return the planner's ``Params`` with ``values`` set, each converted to the declared type."""
+    fields = planner.Params._field_defaults
+    for key in values:
+        if key not in fields:
+            raise UnknownNameError("parameter", key, fields, f"planner '{planner.NAME}'")
+    return planner.Params(**{k: type(v)(values.get(k, v)) for k, v in fields.items()})
+
+
+def _load(file: str) -> ModuleType:
+    return importlib.import_module(f"swarmscope.onboard.planning.{file}")

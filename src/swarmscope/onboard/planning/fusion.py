@@ -1,0 +1,102 @@
+"""The choice of a side: own features, neighbours' features, fused (Nav-SCOPE 8-15, Algorithm 1 lines 16-27)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from swarmscope._jit import jit
+from swarmscope.geometry import wrap_angle
+from swarmscope.onboard.percept import PEERS, Rig
+from swarmscope.onboard.perception.areas import normalise, passable_distance, quadrant_area
+from swarmscope.onboard.perception.features import align_features
+from swarmscope.onboard.planning.fields import (
+    following_probability,
+    fuse,
+    in_pass_band,
+    interaction_force,
+    left_probability,
+)
+
+
+@jit
+def own_probability(angles: np.ndarray, distances: np.ndarray, count: int, half_alpha: float) -> float:
+    """Return P_a (9) from our features in the target-aligned frame, sorted in [0, 2 pi), normalised distances."""
+    quarter = 0.5 * math.pi
+    return left_probability(
+        quadrant_area(angles, distances, count, 0.0, half_alpha, False),
+        quadrant_area(angles, distances, count, -half_alpha, 0.0, False),
+        quadrant_area(angles, distances, count, half_alpha, quarter, False),
+        quadrant_area(angles, distances, count, -quarter, -half_alpha, False),
+    )
+
+
+@jit
+def choose_side(
+    percept: np.ndarray,
+    shared: np.ndarray,
+    decision: np.ndarray,
+    rig: Rig,
+    w_i: float,
+    angles: np.ndarray,
+    distances: np.ndarray,
+    count: int,
+    out_angles: np.ndarray,
+    out_distances: np.ndarray,
+) -> int:
+    """Return the side to pass the obstacle on, +1 left or -1 right, and note the numbers in ``decision``.
+
+    ``angles``, ``distances``: our ``count`` features, compass frame, m. Left iff P_dir >= 0.5 (MAP, readings 10).
+    """
+    target = percept["compass"] + percept["goal_bearing"]
+    half_alpha = 0.5 * rig.protection.alpha
+    range_max = rig.sensor.range_max
+    align_features(angles, distances, count, -target, out_angles, out_distances)
+    _normalise_all(out_distances, count, range_max)
+    p_self = own_probability(out_angles, out_distances, count, half_alpha)
+    threshold = normalise(rig.protection.w_n, range_max)
+    weighted, weights = 0.0, 0.0
+    heard = 0
+    for t in range(PEERS):
+        if shared["track_id"][t] < 0:
+            continue
+        x, y = shared["track_x"][t], shared["track_y"][t]
+        distance = math.sqrt(x * x + y * y)
+        if not in_pass_band(distance, rig.protection.sigma_a):
+            continue
+        bearing = wrap_angle(math.atan2(y, x) - target)
+        slot = _heard_of(shared, shared["track_id"][t])
+        if slot < 0 or abs(bearing) > 0.5 * math.pi:
+            continue
+        n = shared["heard_n"][slot]
+        align_features(
+            shared["heard_angle"][slot], shared["heard_distance"][slot], n, -target, out_angles, out_distances
+        )
+        _normalise_all(out_distances, n, range_max)
+        x_1 = passable_distance(out_angles, out_distances, n, 0.0, half_alpha, False)
+        x_2 = passable_distance(out_angles, out_distances, n, -half_alpha, 0.0, False)
+        force = interaction_force(distance, rig.protection.sigma_a, w_i)
+        weighted += force * following_probability(x_1, x_2, threshold, bearing >= 0.0)
+        weights += force
+        heard += 1
+    p_left = fuse(p_self, weighted, weights)
+    decision["p_self"], decision["p_left"] = p_self, p_left
+    decision["fused"], decision["heard"] = 1, heard
+    return 1 if p_left >= 0.5 else -1
+
+
+@jit
+def _normalise_all(distances: np.ndarray, count: int, range_max: float) -> None:
+    """Apply (SFM-MAS 25) to the first ``count`` distances in place."""
+    for j in range(count):
+        distances[j] = normalise(distances[j], range_max)
+
+
+@jit
+def _heard_of(shared: np.ndarray, peer: int) -> int:
+    """Return the slot with the features of ``peer``, or -1."""
+    for p in range(PEERS):
+        if shared["heard_id"][p] == peer and shared["heard_n"][p] > 0:
+            return p
+    return -1

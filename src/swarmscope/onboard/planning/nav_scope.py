@@ -1,0 +1,467 @@
+"""Nav-SCOPE: advance while the target direction is safe; else choose a side with the neighbours' help and follow.
+
+The four states of Nav-SCOPE V-A with what the paper leaves open: a final approach to goals near obstacles,
+an end to every wait, and an end to every loop (docs/safety.md).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from swarmscope._jit import jit, jit_inline
+from swarmscope.geometry import TWO_PI, wrap_angle
+from swarmscope.onboard.control.guard import halt, head_for
+from swarmscope.onboard.control.unicycle import arrival_speed
+from swarmscope.onboard.percept import PEERS, Rig, Scratch
+from swarmscope.onboard.perception.safety import beam_of, corridor_length, safe_directions
+from swarmscope.onboard.planning._contract import (
+    ADVANCE,
+    ARRIVED,
+    DECIDE,
+    ESCAPE,
+    FOLLOW,
+    R_ALONE,
+    R_ANSWERS,
+    R_ARRIVED,
+    R_DEAD_END,
+    R_FINAL,
+    R_FOLLOW,
+    R_FREE,
+    R_FUSED,
+    R_LOOP,
+    R_LOST,
+    R_YIELD,
+    YIELD,
+)
+from swarmscope.onboard.planning.fields import interaction_force, yields_to
+from swarmscope.onboard.planning.fusion import choose_side
+from swarmscope.onboard.sharing.inbox import answer_all, ask, start_round, waiting_for_answers
+from swarmscope.onboard.tick import begin, features, finish
+
+NAME = "nav-scope"
+SUMMARY = "Nav-SCOPE: safe directions, features of neighbours on request, fused choice of side, four states"
+NEEDS = "own scan, goal bearing and distance, relative poses of visible neighbours, features on request"
+LOG = 16
+
+
+class Params(NamedTuple):
+    """What can be set. Distances in m, times in s."""
+
+    w_i: float = 1.0
+    """Weight of the neighbours (12); 0 is Nav-I."""
+    ask_ahead_s: float = 0.6
+    """Features are asked for this long before the obstacle is at the planning distance."""
+    patience_s: float = 0.6
+    """How long a decision waits for answers that are still out."""
+    arrive_m: float = 0.05
+    """Distance to the goal at which a robot has arrived."""
+    still_s: float = 1.2
+    """A neighbour that has not moved for so long is an obstacle."""
+    wait_s: float = 2.0
+    """Longest wait for a neighbour to pass; after it the neighbour is an obstacle for the same time."""
+    loop_m: float = 1.0
+    """A second choice of side this close to an earlier one, without progress, is a loop."""
+
+
+MEMORY = np.dtype(
+    [
+        ("mode", np.uint8),
+        ("side", np.int8),
+        ("strict", np.uint8),  # follows the border until closer to the goal than ever (after a loop)
+        ("flips", np.int64),
+        ("heading", np.float64),  # direction of travel, compass frame [rad]
+        ("best", np.float64),  # smallest goal distance so far [m]
+        ("best_s", np.float64),  # when
+        ("leave", np.float64),  # goal distance to beat before a strict following ends [m]
+        ("strict_x", np.float64),  # where the strict following began, own odometry [m]
+        ("strict_y", np.float64),
+        ("strict_away", np.uint8),
+        ("wait_s", np.float64),  # when the present wait began, -1 = none
+        ("push_s", np.float64),  # until when waiting is not allowed
+        ("log_n", np.int64),  # choices of a side so far
+        ("log_x", np.float64, LOG),
+        ("log_y", np.float64, LOG),
+        ("log_goal", np.float64, LOG),
+        ("log_side", np.int8, LOG),
+    ]
+)
+
+
+def new_memory(robots: int) -> np.ndarray:
+    """Return the memory of ``robots`` robots that have seen nothing yet."""
+    memory = np.zeros(robots, MEMORY)
+    memory["wait_s"] = -1.0
+    memory["best"] = np.inf
+    return memory
+
+
+@jit
+def step(
+    ranges: np.ndarray,
+    percept: np.ndarray,
+    shared: np.ndarray,
+    memory: np.ndarray,
+    decision: np.ndarray,
+    scratch: Scratch,
+    row: int,
+    rig: Rig,
+    params: Params,
+) -> None:
+    """Run one tick of the robot whose working arrays are row ``row``: scan to command, packets and reason."""
+    work, safe, edges = scratch.work[row], scratch.safe[row], scratch.edges[row]
+    angles, distances = scratch.angles[row], scratch.distances[row]
+    safe_count = begin(
+        ranges,
+        percept,
+        shared,
+        decision,
+        work,
+        edges,
+        safe,
+        scratch.header[row],
+        angles,
+        distances,
+        rig,
+        params.still_s,
+    )
+    count = -1
+    if wants_features(percept, shared, memory, safe, rig):
+        count = features(
+            work, percept, safe, scratch.padded[row], angles, distances, scratch.filtered[row], rig
+        )
+    if shared["ask_n"] > 0:
+        answer_all(percept, shared, decision, rig, angles[0], distances[0], count)
+    decide(
+        ranges,
+        percept,
+        shared,
+        memory,
+        decision,
+        work,
+        safe,
+        safe_count,
+        edges,
+        angles,
+        distances,
+        count,
+        rig,
+        params,
+    )
+    finish(ranges, percept, shared, decision, edges, rig)
+
+
+@jit
+def step_all(
+    first: int,
+    last: int,
+    ranges: np.ndarray,
+    percepts: np.ndarray,
+    shared: np.ndarray,
+    memories: np.ndarray,
+    decisions: np.ndarray,
+    scratch: Scratch,
+    rig: Rig,
+    params: Params,
+) -> None:
+    """Run one tick of robots ``first`` to ``last - 1``."""
+    for i in range(first, last):
+        step(ranges[i], percepts[i], shared[i], memories[i], decisions[i], scratch, i, rig, params)
+
+
+@jit
+def decide(
+    ranges: np.ndarray,
+    percept: np.ndarray,
+    shared: np.ndarray,
+    memory: np.ndarray,
+    decision: np.ndarray,
+    masked: np.ndarray,
+    safe: np.ndarray,
+    safe_count: int,
+    edges: np.ndarray,
+    features: np.ndarray,
+    distances: np.ndarray,
+    count: int,
+    rig: Rig,
+    params: Params,
+) -> None:
+    """Choose state, heading and speed. ``features``, ``distances (2, K)``: ours in row 0 (compass frame), scratch 1.
+
+    ``masked`` is the scan without moving neighbours, ``safe`` its safe directions; ``count`` is -1 when our
+    features were not computed in this tick (see ``wants_features``).
+    """
+    goal = percept["goal_distance"]
+    now = percept["now_s"]
+    if memory["mode"] == ARRIVED or goal <= params.arrive_m:
+        memory["mode"] = ARRIVED
+        halt(decision)
+        _say(decision, memory, ARRIVED, R_ARRIVED)
+        return
+    if goal < memory["best"] - 0.3:
+        memory["best"], memory["best_s"] = goal, now
+    sensor = rig.sensor
+    bearing = percept["goal_bearing"]
+    speed = arrival_speed(goal - 0.5 * params.arrive_m, rig.body.v_max, rig.body.a_max, percept["dt_s"])
+    final = goal <= rig.protection.l_th + rig.footprint
+    if final:
+        free = (
+            corridor_length(
+                masked, sensor.range_min, sensor.angle_min, sensor.increment, bearing, rig.footprint, goal
+            )
+            >= goal
+        )
+    else:
+        beam = beam_of(bearing, sensor.angle_min, sensor.increment, sensor.beams, sensor.wraps)
+        free = beam >= 0 and safe[beam] == 1
+    if free and _may_leave(memory, goal):
+        memory["side"] = 0
+        memory["strict"] = 0
+        memory["mode"] = ADVANCE
+        head_for(decision, percept, bearing, speed, rig)
+        _say(decision, memory, ADVANCE, R_FINAL if final else R_FREE)
+        _request_ahead(masked, percept, shared, decision, rig, params)
+    else:
+        if memory["mode"] != FOLLOW:
+            if not _decide_side(percept, shared, memory, decision, rig, params, features, distances, count):
+                return
+        _follow(ranges, masked, percept, memory, decision, safe, safe_count, edges, rig, speed)
+    _yield(percept, shared, memory, decision, rig, params)
+    memory["heading"] = percept["compass"] + decision["heading"]
+
+
+@jit
+def wants_features(percept: np.ndarray, shared: np.ndarray, memory: np.ndarray, safe: np.ndarray, rig: Rig) -> bool:
+    """Tell whether our own features are needed in this tick: somebody asked, or a side may have to be chosen."""
+    if shared["ask_n"] > 0:
+        return True
+    if memory["mode"] == ARRIVED or memory["mode"] == FOLLOW:
+        return False
+    sensor = rig.sensor
+    beam = beam_of(percept["goal_bearing"], sensor.angle_min, sensor.increment, sensor.beams, sensor.wraps)
+    return beam < 0 or safe[beam] == 0
+
+
+@jit_inline
+def _say(decision: np.ndarray, memory: np.ndarray, state: int, reason: int) -> None:
+    """Note state and reason for people to read."""
+    decision["state"], decision["reason"], decision["side"] = state, reason, memory["side"]
+
+
+@jit_inline
+def _may_leave(memory: np.ndarray, goal: float) -> bool:
+    """Tell whether a following may end: always, but after a loop only closer to the goal than ever before."""
+    return memory["strict"] == 0 or goal < memory["leave"]
+
+
+@jit
+def _request_ahead(
+    masked: np.ndarray, percept: np.ndarray, shared: np.ndarray, decision: np.ndarray, rig: Rig, params: Params
+) -> None:
+    """Ask the neighbours in the pass band for features when an obstacle nears the planning distance."""
+    now = percept["now_s"]
+    if params.w_i <= 0.0 or now - shared["asked_s"] < params.ask_ahead_s:
+        return
+    sensor = rig.sensor
+    horizon = rig.protection.l_th + params.ask_ahead_s * rig.body.v_max
+    if percept["goal_distance"] <= horizon:
+        return
+    centre = beam_of(percept["goal_bearing"], sensor.angle_min, sensor.increment, sensor.beams, sensor.wraps)
+    for k in range(-rig.half, rig.half + 1):
+        n = (centre + k) % sensor.beams if sensor.wraps else centre + k
+        if 0 <= n < sensor.beams and masked[n] < horizon:
+            _ask_neighbours(percept, shared, decision, rig)
+            return
+
+
+@jit
+def _ask_neighbours(percept: np.ndarray, shared: np.ndarray, decision: np.ndarray, rig: Rig) -> None:
+    """Start a round of requests to every neighbour seen now in the pass band (sigma_a, 3 sigma_a]."""
+    start_round(percept, shared)
+    sigma = rig.protection.sigma_a
+    for k in range(percept["n_neighbours"]):
+        x, y = percept["neighbour_x"][k], percept["neighbour_y"][k]
+        distance = math.sqrt(x * x + y * y)
+        ahead = abs(wrap_angle(math.atan2(y, x) - percept["goal_bearing"])) <= 0.5 * math.pi
+        if ahead and sigma - 0.2 < distance <= 3.0 * sigma + 0.2:
+            ask(percept, shared, decision, percept["neighbour_id"][k])
+
+
+@jit
+def _decide_side(
+    percept: np.ndarray,
+    shared: np.ndarray,
+    memory: np.ndarray,
+    decision: np.ndarray,
+    rig: Rig,
+    params: Params,
+    features: np.ndarray,
+    distances: np.ndarray,
+    count: int,
+) -> bool:
+    """State ii: choose the side, waiting for answers that are still out. Return whether it is chosen."""
+    now = percept["now_s"]
+    if params.w_i > 0.0 and memory["mode"] != DECIDE and now - shared["asked_s"] > params.patience_s + 0.3:
+        _ask_neighbours(percept, shared, decision, rig)
+    memory["mode"] = DECIDE
+    if waiting_for_answers(percept, shared, params.patience_s):
+        halt(decision)
+        _say(decision, memory, DECIDE, R_ANSWERS)
+        return False
+    side = choose_side(
+        percept, shared, decision, rig, params.w_i, features[0], distances[0], max(0, count), features[1], distances[1]
+    )
+    memory["side"] = _break_loop(percept, shared, memory, params, side)
+    _say(decision, memory, DECIDE, R_LOOP if memory["strict"] else (R_FUSED if decision["heard"] else R_ALONE))
+    memory["mode"] = FOLLOW
+    return True
+
+
+@jit
+def _break_loop(percept: np.ndarray, shared: np.ndarray, memory: np.ndarray, params: Params, side: int) -> int:
+    """Log the choice; when it repeats an earlier one without progress, follow strictly on that earlier side."""
+    x, y, goal = shared["x"], shared["y"], percept["goal_distance"]
+    known = min(LOG, memory["log_n"])
+    for k in range(known):
+        j = (memory["log_n"] - 1 - k) % LOG
+        d = math.sqrt((x - memory["log_x"][j]) ** 2 + (y - memory["log_y"][j]) ** 2)
+        if d < params.loop_m and goal > memory["log_goal"][j] - 0.2:
+            _start_strict(shared, memory)
+            side = memory["log_side"][j]
+            break
+    j = memory["log_n"] % LOG
+    memory["log_x"][j], memory["log_y"][j], memory["log_goal"][j] = x, y, goal
+    memory["log_side"][j] = side
+    memory["log_n"] += 1
+    return side
+
+
+@jit_inline
+def _start_strict(shared: np.ndarray, memory: np.ndarray) -> None:
+    """Begin a strict following here."""
+    memory["strict"] = 1
+    memory["leave"] = memory["best"] - 0.1
+    memory["strict_x"], memory["strict_y"] = shared["x"], shared["y"]
+    memory["strict_away"] = 0
+
+
+@jit
+def _follow(
+    ranges: np.ndarray,
+    masked: np.ndarray,
+    percept: np.ndarray,
+    memory: np.ndarray,
+    decision: np.ndarray,
+    safe: np.ndarray,
+    safe_count: int,
+    edges: np.ndarray,
+    rig: Rig,
+    speed: float,
+) -> None:
+    """State iii: the first safe direction on the chosen side, counted from the target (16), or from the border."""
+    sensor = rig.sensor
+    side = memory["side"]
+    reason = R_FOLLOW
+    if decision["fused"]:
+        reason = decision["reason"]
+    state = FOLLOW
+    if safe_count == 0:
+        reason = R_DEAD_END
+        state = ESCAPE
+        safe_count = safe_directions(
+            masked,
+            sensor.range_min,
+            sensor.increment,
+            sensor.wraps,
+            rig.protection.r,
+            0,
+            rig.footprint,
+            edges,
+            safe,
+        )
+    start = percept["goal_bearing"]
+    if memory["strict"]:
+        start = memory["heading"] - percept["compass"] - side * 0.6 * math.pi
+        reason = R_LOOP
+    heading, found = first_safe(safe, start, side, sensor.angle_min, sensor.increment, sensor.beams, sensor.wraps)
+    if not found:
+        heading = away_from_nearest(ranges, rig)
+        reason = R_LOST
+    head_for(decision, percept, heading, speed if memory["strict"] == 0 else rig.body.v_max, rig)
+    decision["state"], decision["reason"], decision["side"] = state, reason, side
+
+
+@jit
+def first_safe(
+    safe: np.ndarray, start: float, side: int, angle_min: float, increment: float, beams: int, wraps: bool
+) -> tuple[float, bool]:
+    """Return the first safe direction from ``start`` on ``side`` (+1 counter-clockwise), body frame, and whether any is.
+
+    (Nav-SCOPE 16): the safe direction closest to the target on the chosen side.
+    """
+    first = int(math.floor((start - angle_min) / increment + 0.5))
+    turns = beams if wraps else int(TWO_PI / increment)
+    for k in range(turns):
+        n = first + side * k
+        if wraps or n < 0 or n >= beams:
+            n = n % (beams if wraps else turns)
+        if n < beams and safe[n] == 1:
+            return wrap_angle(angle_min + n * increment), True
+    return 0.0, False
+
+
+@jit
+def away_from_nearest(ranges: np.ndarray, rig: Rig) -> float:
+    """Return the direction opposite to the nearest valid return (body frame): the one that gains clearance."""
+    nearest, at = math.inf, 0
+    for n in range(ranges.size):
+        if rig.sensor.range_min <= ranges[n] < nearest:
+            nearest, at = ranges[n], n
+    return wrap_angle(rig.sensor.angle_min + at * rig.sensor.increment + math.pi)
+
+
+@jit
+def _yield(
+    percept: np.ndarray, shared: np.ndarray, memory: np.ndarray, decision: np.ndarray, rig: Rig, params: Params
+) -> None:
+    """State iv: wait for a neighbour whose repulsion outweighs our own propulsion (17), but not for ever."""
+    now = percept["now_s"]
+    if now < memory["push_s"] or not _must_wait(percept, shared, decision, rig, params):
+        memory["wait_s"] = -1.0
+        return
+    if memory["wait_s"] < 0.0:
+        memory["wait_s"] = now
+    if now - memory["wait_s"] > params.wait_s:
+        memory["wait_s"] = -1.0
+        memory["push_s"] = now + params.wait_s
+        return
+    decision["v"] = 0.0
+    decision["state"], decision["reason"] = YIELD, R_YIELD
+
+
+@jit
+def _must_wait(
+    percept: np.ndarray, shared: np.ndarray, decision: np.ndarray, rig: Rig, params: Params
+) -> bool:
+    """Tell whether (17) holds for a moving neighbour that goes before us.
+
+    It does when it drives away from us (we follow it) or, heads-on or crossing, has the smaller radio address.
+    """
+    travel = percept["compass"] + decision["heading"]
+    for t in range(PEERS):
+        if shared["track_id"][t] < 0 or percept["now_s"] - shared["track_moved_s"][t] >= params.still_s:
+            continue
+        x, y = shared["track_x"][t], shared["track_y"][t]
+        distance = math.sqrt(x * x + y * y)
+        if distance >= rig.protection.sigma_a or distance < 1e-6:
+            continue
+        force = interaction_force(distance, rig.protection.sigma_a, max(params.w_i, 1.0))
+        bearing = math.atan2(y, x)
+        if not yields_to(0.5, force, math.cos(bearing - travel)):
+            continue
+        faces_us = math.cos(shared["track_yaw"][t] - bearing - math.pi) > 0.3
+        if not faces_us or shared["track_id"][t] < percept["id"]:
+            return True
+    return False

@@ -1,0 +1,163 @@
+"""Requests and answers: what to do with packets that came in, whom to ask, what to answer (Nav-SCOPE IV-B).
+
+Bad packets (torn, corrupt, foreign) and stale ones (replayed, older than the newest of the sender, answers
+to a question that is no longer open) are dropped and counted; nothing here raises or waits.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from swarmscope._jit import jit, jit_inline
+from swarmscope.onboard.percept import MAX_OUTBOX, PEERS, Rig
+from swarmscope.onboard.sharing.message import (
+    KIND_REQUEST,
+    OK,
+    decode,
+    encode_exact_features,
+    encode_features,
+    encode_request,
+    read_features,
+    seq_newer,
+)
+
+
+@jit
+def read_inbox(percept: np.ndarray, shared: np.ndarray, rig: Rig, header: np.ndarray, angles: np.ndarray, distances: np.ndarray) -> None:
+    """Take in this tick's packets: remember features heard and who asks for ours.
+
+    ``header (5,) int64``, ``angles``, ``distances`` are scratch.
+    """
+    now = percept["now_s"]
+    shared["ask_n"] = 0
+    for p in range(PEERS):
+        if shared["heard_id"][p] >= 0 and now - shared["heard_s"][p] > rig.max_feature_age:
+            shared["heard_id"][p] = -1
+    for k in range(percept["n_packets"]):
+        data = percept["packet"][k]
+        length = percept["packet_length"][k]
+        if decode(data, length, header) != OK:
+            shared["dropped_bad"] += 1
+            continue
+        if header[1] == percept["id"] or not _is_new(shared, header[1], header[2]):
+            shared["dropped_stale"] += 1
+            continue
+        if header[0] == KIND_REQUEST:
+            if shared["ask_n"] < PEERS:
+                shared["ask_id"][shared["ask_n"]] = header[1]
+                shared["ask_seq"][shared["ask_n"]] = header[2]
+                shared["ask_n"] += 1
+            continue
+        if header[3] != shared["asked_seq"] or now - shared["asked_s"] > rig.max_feature_age:
+            shared["dropped_stale"] += 1
+            continue
+        count = read_features(data, length, rig.sensor.range_max, angles, distances)
+        _remember(shared, header[1], count, angles, distances)
+
+
+@jit_inline
+def _is_new(shared: np.ndarray, sender: int, seq: int) -> bool:
+    """Tell whether ``seq`` is newer than everything accepted from ``sender``, and note it."""
+    slot = -1
+    for p in range(PEERS):
+        if shared["last_seq_id"][p] == sender:
+            if not seq_newer(seq, shared["last_seq"][p]):
+                return False
+            slot = p
+            break
+        if slot < 0 and shared["last_seq_id"][p] < 0:
+            slot = p
+    if slot < 0:
+        slot = sender % PEERS
+    shared["last_seq_id"][slot] = sender
+    shared["last_seq"][slot] = seq
+    return True
+
+
+@jit_inline
+def _remember(shared: np.ndarray, sender: int, count: int, angles: np.ndarray, distances: np.ndarray) -> None:
+    """Store the features of ``sender``, in its slot, a free one, or the oldest."""
+    slot = -1
+    oldest = 0
+    for p in range(PEERS):
+        if shared["heard_id"][p] == sender:
+            slot = p
+            break
+        if slot < 0 and shared["heard_id"][p] < 0:
+            slot = p
+        if shared["heard_s"][p] < shared["heard_s"][oldest]:
+            oldest = p
+    if slot < 0:
+        slot = oldest
+    shared["heard_id"][slot] = sender
+    shared["heard_s"][slot] = shared["asked_s"]
+    shared["heard_n"][slot] = count
+    shared["answers_n"] += 1
+    for j in range(count):
+        shared["heard_angle"][slot, j] = angles[j]
+        shared["heard_distance"][slot, j] = distances[j]
+
+
+@jit
+def start_round(percept: np.ndarray, shared: np.ndarray) -> None:
+    """Begin a new round of requests; answers to earlier rounds are stale from here on."""
+    shared["seq"] = (shared["seq"] + 1) & 0xFFFF
+    shared["asked_seq"] = shared["seq"]
+    shared["asked_s"] = percept["now_s"]
+    shared["asked_n"] = 0
+    shared["answers_n"] = 0
+
+
+@jit
+def ask(percept: np.ndarray, shared: np.ndarray, decision: np.ndarray, peer: int) -> None:
+    """Put a request to ``peer`` of the current round into the outbox (left out when that is full)."""
+    k = decision["n_out"]
+    if k >= MAX_OUTBOX:
+        return
+    decision["out_to"][k] = peer
+    decision["out_length"][k] = encode_request(percept["id"], shared["asked_seq"], decision["out"][k])
+    decision["n_out"] = k + 1
+    shared["asked_n"] += 1
+
+
+@jit
+def answer_all(
+    percept: np.ndarray,
+    shared: np.ndarray,
+    decision: np.ndarray,
+    rig: Rig,
+    angles: np.ndarray,
+    distances: np.ndarray,
+    count: int,
+) -> None:
+    """Answer everybody who asked with our features (compass frame)."""
+    for q in range(shared["ask_n"]):
+        k = decision["n_out"]
+        if k >= MAX_OUTBOX:
+            return
+        shared["seq"] = (shared["seq"] + 1) & 0xFFFF
+        decision["out_to"][k] = shared["ask_id"][q]
+        encode = decision["out"][k]
+        if rig.exact_features:
+            length = encode_exact_features(
+                percept["id"], shared["seq"], shared["ask_seq"][q], angles, distances, count, encode
+            )
+        else:
+            length = encode_features(
+                percept["id"],
+                shared["seq"],
+                shared["ask_seq"][q],
+                angles,
+                distances,
+                count,
+                rig.sensor.range_max,
+                encode,
+            )
+        decision["out_length"][k] = length
+        decision["n_out"] = k + 1
+
+
+@jit_inline
+def waiting_for_answers(percept: np.ndarray, shared: np.ndarray, patience: float) -> bool:
+    """Tell whether answers to a round younger than ``patience`` [s] are still out."""
+    return shared["answers_n"] < shared["asked_n"] and percept["now_s"] - shared["asked_s"] < patience

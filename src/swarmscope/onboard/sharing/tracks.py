@@ -1,0 +1,162 @@
+"""Where the neighbours are: mutual positioning, filtered, with visual persistence (Nav-SCOPE IV-B, readings 13)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from swarmscope._jit import jit, jit_inline
+from swarmscope.onboard.percept import PEERS, Rig
+
+STILL_RADIUS = 0.08
+"""A neighbour that stays within this of one place stands still [m]."""
+
+
+@jit
+def update_odometry(percept: np.ndarray, shared: np.ndarray) -> tuple[float, float]:
+    """Add this tick's odometry to the robot's own displacement; return it (compass frame) [m]."""
+    if shared["started"] == 0:
+        shared["started"] = 1
+        shared["compass"] = percept["compass"]
+        return 0.0, 0.0
+    c, s = math.cos(shared["compass"]), math.sin(shared["compass"])
+    dx = c * percept["odom_x"] - s * percept["odom_y"]
+    dy = s * percept["odom_x"] + c * percept["odom_y"]
+    shared["x"] += dx
+    shared["y"] += dy
+    shared["compass"] = percept["compass"]
+    return dx, dy
+
+
+@jit
+def update_tracks(percept: np.ndarray, shared: np.ndarray, rig: Rig, dx: float, dy: float) -> None:
+    """Move every track on by dead reckoning, then correct it with what is observed now.
+
+    An alpha-beta filter in the compass frame, relative to the robot; ``dx, dy`` [m] is its own motion. A
+    neighbour that drops out of view is kept for ``rig.persistence``, slowing down.
+    """
+    now, dt = percept["now_s"], percept["dt_s"]
+    noisy = rig.sensor.position_sigma > 0.0
+    alpha = 0.6 if noisy else 1.0
+    beta = 0.15 if noisy else 0.7
+    for t in range(PEERS):
+        if shared["track_id"][t] < 0:
+            continue
+        if now - shared["track_seen_s"][t] > rig.persistence:
+            shared["track_id"][t] = -1
+            continue
+        shared["track_x"][t] += shared["track_vx"][t] * dt - dx
+        shared["track_y"][t] += shared["track_vy"][t] * dt - dy
+    c, s = math.cos(percept["compass"]), math.sin(percept["compass"])
+    for k in range(percept["n_neighbours"]):
+        x = c * percept["neighbour_x"][k] - s * percept["neighbour_y"][k]
+        y = s * percept["neighbour_x"][k] + c * percept["neighbour_y"][k]
+        t = _find(shared, percept["neighbour_id"][k])
+        if t < 0:
+            t = _place(shared, x, y)
+            if t < 0:
+                continue
+            shared["track_id"][t] = percept["neighbour_id"][k]
+            shared["track_x"][t], shared["track_y"][t] = x, y
+            shared["track_vx"][t], shared["track_vy"][t] = 0.0, 0.0
+            shared["track_anchor_x"][t] = shared["x"] + x
+            shared["track_anchor_y"][t] = shared["y"] + y
+            shared["track_moved_s"][t] = now
+        else:
+            ex, ey = x - shared["track_x"][t], y - shared["track_y"][t]
+            shared["track_x"][t] += alpha * ex
+            shared["track_y"][t] += alpha * ey
+            shared["track_vx"][t] += beta / dt * ex
+            shared["track_vy"][t] += beta / dt * ey
+        shared["track_yaw"][t] = percept["compass"] + percept["neighbour_yaw"][k]
+        shared["track_seen_s"][t] = now
+    _limit_speed_and_anchor(shared, rig, now)
+
+
+@jit
+def _limit_speed_and_anchor(shared: np.ndarray, rig: Rig, now: float) -> None:
+    """Clip estimated speeds to what the robots can do, slow unseen ones down, notice who stands still."""
+    for t in range(PEERS):
+        if shared["track_id"][t] < 0:
+            continue
+        vx, vy = shared["track_vx"][t], shared["track_vy"][t]
+        speed = math.sqrt(vx * vx + vy * vy)
+        factor = 0.8 if shared["track_seen_s"][t] < now else 1.0
+        if speed > rig.body.v_max:
+            factor *= rig.body.v_max / speed
+        shared["track_vx"][t] *= factor
+        shared["track_vy"][t] *= factor
+        x, y = shared["track_x"][t], shared["track_y"][t]
+        ex = shared["x"] + x - shared["track_anchor_x"][t]
+        ey = shared["y"] + y - shared["track_anchor_y"][t]
+        limit = STILL_RADIUS + 2.0 * rig.sensor.position_sigma * math.sqrt(x * x + y * y)
+        if ex * ex + ey * ey > limit * limit:
+            shared["track_anchor_x"][t] = shared["x"] + x
+            shared["track_anchor_y"][t] = shared["y"] + y
+            shared["track_moved_s"][t] = now
+
+
+@jit_inline
+def _find(shared: np.ndarray, peer: int) -> int:
+    """Return the track of ``peer``, or -1."""
+    for t in range(PEERS):
+        if shared["track_id"][t] == peer:
+            return t
+    return -1
+
+
+@jit_inline
+def _place(shared: np.ndarray, x: float, y: float) -> int:
+    """Return a free track, else the farthest one if it is farther than (x, y), else -1."""
+    worst, worst_d2 = -1, x * x + y * y
+    for t in range(PEERS):
+        if shared["track_id"][t] < 0:
+            return t
+        d2 = shared["track_x"][t] ** 2 + shared["track_y"][t] ** 2
+        if d2 > worst_d2:
+            worst, worst_d2 = t, d2
+    return worst
+
+
+@jit
+def mask_moving_neighbours(
+    ranges: np.ndarray, percept: np.ndarray, shared: np.ndarray, rig: Rig, still_s: float, out: np.ndarray
+) -> None:
+    """Copy the scan into ``out`` without the returns of neighbours that move (no return instead).
+
+    Moving neighbours are kept apart from by the yield rule and the guard; taken for obstacles they would
+    make every robot turn off behind every other. One that has stood for ``still_s`` stays in: it is an obstacle.
+    """
+    sensor = rig.sensor
+    for n in range(sensor.beams):
+        out[n] = ranges[n]
+    for t in range(PEERS):
+        if shared["track_id"][t] < 0 or percept["now_s"] - shared["track_moved_s"][t] >= still_s:
+            continue
+        c, s = math.cos(percept["compass"]), math.sin(percept["compass"])
+        x = c * shared["track_x"][t] + s * shared["track_y"][t]
+        y = c * shared["track_y"][t] - s * shared["track_x"][t]
+        d = math.sqrt(x * x + y * y)
+        reach = neighbour_reach(d, rig)
+        if d - reach > sensor.range_max:
+            continue
+        half_angle = math.asin(reach / d) if d > reach else math.pi
+        spread = int(math.ceil(half_angle / sensor.increment))
+        centre = int(math.floor((math.atan2(y, x) - sensor.angle_min) / sensor.increment + 0.5))
+        if 2 * spread + 1 > sensor.beams:
+            spread = (sensor.beams - 1) // 2
+        for k in range(centre - spread, centre + spread + 1):
+            n = k % sensor.beams if sensor.wraps else k
+            if n < 0 or n >= sensor.beams or not ranges[n] >= sensor.range_min:
+                continue
+            ex, ey = ranges[n] * rig.cos[n] - x, ranges[n] * rig.sin[n] - y
+            if ex * ex + ey * ey <= reach * reach:
+                out[n] = np.inf
+
+
+@jit_inline
+def neighbour_reach(distance: float, rig: Rig) -> float:
+    """Return how far from a neighbour's estimated centre its returns may lie [m], errors included."""
+    noise = rig.sensor.position_sigma + rig.sensor.range_sigma
+    return rig.body.radius + 0.06 + 2.0 * noise * distance

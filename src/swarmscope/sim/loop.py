@@ -1,0 +1,229 @@
+"""The run: sense, decide, exchange, move, judge, each over all robots from one snapshot, until all have arrived."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor, wait
+from dataclasses import dataclass, field
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from swarmscope._jit import jit
+from swarmscope.onboard.percept import Rig
+from swarmscope.sim.cells import index_robots
+from swarmscope.sim.lidar import Beams
+from swarmscope.sim.motion import judge, move
+from swarmscope.sim.radio import exchange
+from swarmscope.sim.sensing import sense
+from swarmscope.sim.state import Clock, Noise, Radio, Records, Sim, new_records, new_sim
+from swarmscope.sim.world import World
+
+CHUNK = 256
+"""Ticks for which records are allocated at once."""
+PLAN_SAMPLES = 200
+"""Planning steps that are timed one by one for the percentiles."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A run, ready for the kernels."""
+
+    world: World
+    bounds: tuple[float, float, float, float]
+    starts: np.ndarray
+    goals: np.ndarray
+    beams: Beams
+    rig: Rig
+    planner: ModuleType
+    params: Any
+    noise: Noise = field(default_factory=Noise)
+    radio: Radio = field(default_factory=Radio)
+    seed: int = 0
+    dt: float = 0.2
+    substeps: int = 20
+    limit_s: float = 300.0
+    threads: int = 1
+    record_scans: bool = False
+
+
+@dataclass(frozen=True)
+class Trace:
+    """What happened: records ``(T, N)``, robots at the end, deliveries, times."""
+
+    t_s: np.ndarray
+    records: Records
+    robots: np.ndarray
+    shared: np.ndarray
+    links: np.ndarray
+    plan_us: np.ndarray
+    """Time of single planning steps [us], sampled over the run; measured, so not part of the deterministic bytes."""
+    wall_s: float
+    memory_bytes: int
+    """Planner memory of one robot, everything that its kernels read and write but the packets' way in and out."""
+
+
+@jit
+def _record(sim: Sim, safe: np.ndarray, records: Records, row: int, with_scans: bool) -> None:
+    """Write this tick into row ``row`` of the records."""
+    beams = sim.ranges.shape[1]
+    for i in range(sim.robots.size):
+        robot, decision = sim.robots[i], sim.decisions[i]
+        records.x[row, i], records.y[row, i], records.yaw[row, i] = robot["x"], robot["y"], robot["yaw"]
+        records.speed[row, i] = robot["v"]
+        records.clearance[row, i] = robot["clearance"]
+        records.p_left[row, i] = decision["p_left"]
+        records.state[row, i] = 6 if robot["crashed"] else decision["state"]
+        records.reason[row, i] = 13 if robot["crashed"] else decision["reason"]
+        records.side[row, i] = decision["side"]
+        records.neighbours[row, i] = sim.percepts[i]["n_neighbours"]
+        records.bytes_sent[row, i] = robot["bytes"]
+        if with_scans:
+            for n in range(beams):
+                s = sim.ranges[i, n]
+                level = 255 if not s <= sim.beams.range_max else int(254.0 * s / sim.beams.range_max + 0.5)
+                records.scan[row, i, n] = level
+                if safe[i, n]:
+                    records.safe[row, i, n >> 3] |= np.uint8(128 >> (n & 7))
+
+
+@jit
+def _world_phase(
+    sim: Sim, safe: np.ndarray, records: Records, row: int, with_scans: bool, tick: int
+) -> bool:
+    """Record tick ``tick``, then exchange, move, judge and sense the next; return whether everybody is done."""
+    _record(sim, safe, records, row, with_scans)
+    exchange(sim, tick)
+    move(sim, tick, 0, sim.robots.size)
+    return _settle(sim, tick) or _sense_next(sim, tick)
+
+
+@jit
+def _settle(sim: Sim, tick: int) -> bool:
+    """Judge the tick and sort the robots anew; return whether everybody has arrived or crashed."""
+    judge(sim, tick)
+    index_robots(sim)
+    for i in range(sim.robots.size):
+        if not (sim.robots[i]["arrived"] or sim.robots[i]["crashed"]):
+            return False
+    return True
+
+
+@jit
+def _sense_next(sim: Sim, tick: int) -> bool:
+    """Sense tick ``tick + 1`` for all robots; always False."""
+    sense(sim, tick + 1, 0, sim.robots.size)
+    return False
+
+
+def run(setting: Setting, progress: Callable[[float, int], None] | None = None) -> Trace:
+    """Run to the end; ``progress(simulated seconds, robots done)`` is called every now and then.
+
+    The result does not depend on ``threads``: every kernel writes only its own robots' rows, random numbers
+    are keyed, and what robots do to each other (radio, contacts) happens in the order of the robots.
+    """
+    clock = Clock(int(setting.seed), float(setting.dt), int(setting.substeps))
+    sim, shared, scratch = new_sim(
+        setting.world,
+        setting.bounds,
+        setting.beams,
+        setting.rig,
+        setting.starts,
+        setting.goals,
+        setting.noise,
+        setting.radio,
+        clock,
+    )
+    n = len(setting.starts)
+    memory = setting.planner.new_memory(n)
+    step_all = setting.planner.step_all
+    arguments = (sim.ranges, sim.percepts, shared, memory, sim.decisions, scratch, setting.rig, setting.params)
+    beams = setting.rig.sensor.beams if setting.record_scans else 0
+    ticks = math.ceil(setting.limit_s / setting.dt - 1e-9)
+    chunks: list[Records] = []
+    pool = _Pool(n, setting.threads)
+    plan_us: list[float] = []
+    sample_every = max(1, ticks // PLAN_SAMPLES)
+    begun = time.perf_counter()
+    index_robots(sim)
+    pool.each(lambda a, b: sense(sim, 0, a, b))
+    tick, done = 0, False
+    while tick < ticks and not done:
+        row = tick % CHUNK
+        if row == 0:
+            chunks.append(new_records(min(CHUNK, ticks - tick), n, beams))
+        if tick % sample_every == 0 and pool.size == 1:
+            plan_us += _time_steps(step_all, arguments, n)
+        else:
+            pool.each(lambda a, b: step_all(a, b, *arguments))
+        if pool.size == 1:
+            done = _world_phase(sim, scratch.safe, chunks[-1], row, beams > 0, tick)
+        else:
+            _record(sim, scratch.safe, chunks[-1], row, beams > 0)
+            exchange(sim, tick)
+            now = tick
+            pool.each(lambda a, b: move(sim, now, a, b))
+            done = _settle(sim, tick)
+            if not done:
+                pool.each(lambda a, b: sense(sim, now + 1, a, b))
+        tick += 1
+        if progress is not None and tick % 50 == 0:
+            progress(tick * setting.dt, int((sim.robots["arrived"] | sim.robots["crashed"]).sum()))
+    pool.close()
+    wall_s = time.perf_counter() - begun
+    return Trace(
+        t_s=np.arange(tick) * setting.dt,
+        records=_join(chunks, tick),
+        robots=sim.robots,
+        shared=shared,
+        links=sim.links[: sim.links_n[0]].copy(),
+        plan_us=np.array(plan_us),
+        wall_s=wall_s,
+        memory_bytes=_row_bytes(sim, shared, memory, scratch),
+    )
+
+
+def _time_steps(step_all: Callable[..., None], arguments: tuple[Any, ...], robots: int) -> list[float]:
+    """Run one tick of all robots, timing the whole batch; return the mean time of one robot's step [us]."""
+    before = time.perf_counter_ns()
+    step_all(0, robots, *arguments)
+    return [(time.perf_counter_ns() - before) / 1e3 / robots]
+
+
+class _Pool:
+    """Runs a kernel over chunks of robots, on this thread or on several."""
+
+    def __init__(self, robots: int, threads: int) -> None:
+        self.size = max(1, min(threads, robots))
+        edges = np.linspace(0, robots, self.size + 1).astype(int)
+        self._parts = [(int(a), int(b)) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+        self._pool = ThreadPoolExecutor(self.size) if self.size > 1 else None
+
+    def each(self, kernel: Callable[[int, int], None]) -> None:
+        """Call ``kernel(first, last)`` for every chunk and wait for all."""
+        if self._pool is None:
+            kernel(*self._parts[0])
+            return
+        jobs = [self._pool.submit(kernel, a, b) for a, b in self._parts]
+        wait(jobs)
+        for job in jobs:
+            job.result()
+
+    def close(self) -> None:
+        """Stop the threads."""
+        if self._pool is not None:
+            self._pool.shutdown()
+
+
+def _join(chunks: list[Records], ticks: int) -> Records:
+    """Return the chunks as one, cut to the ticks that were run."""
+    return Records(*(np.concatenate(parts)[:ticks] for parts in zip(*chunks, strict=True)))
+
+
+def _row_bytes(sim: Sim, shared: np.ndarray, memory: np.ndarray, scratch: Any) -> int:
+    """Return the bytes of one robot's rows."""
+    arrays = (sim.percepts, sim.decisions, sim.ranges, shared, memory, *scratch)
+    return int(sum(a[:1].nbytes for a in arrays))

@@ -1,0 +1,166 @@
+"""What each robot perceives: its scan, its neighbours, its goal, its own motion, the packets that have come in."""
+
+from __future__ import annotations
+
+import math
+
+from swarmscope._jit import jit, jit_inline
+from swarmscope.geometry import wrap_angle
+from swarmscope.onboard.percept import MAX_INBOX, MAX_NEIGHBOURS
+from swarmscope.sim.cells import column_of, row_of
+from swarmscope.sim.lidar import cast_disc, cast_static
+from swarmscope.sim.state import Sim
+from swarmscope.sim.streams import (
+    BEARING_NOISE,
+    COMPASS_NOISE,
+    RANGE_NOISE,
+    SCAN_DROP,
+    SCAN_NOISE,
+    add_scan_noise,
+    drop_returns,
+    key,
+    mix,
+    normal,
+)
+
+SIGHT_SLACK = 0.05
+"""A neighbour is in sight when the beam towards its centre ends at most this short of its surface [m]."""
+
+
+@jit
+def sense(sim: Sim, tick: int, first: int, last: int) -> None:
+    """Fill scan and percept of robots ``first`` to ``last - 1`` from one snapshot of all poses."""
+    for i in range(first, last):
+        _sense_self(sim, tick, i)
+        _scan_and_neighbours(sim, tick, i)
+        _receive(sim, tick, i)
+
+
+@jit_inline
+def _compass_error(sim: Sim, tick: int, i: int) -> float:
+    """Return the error of robot i's compass at this tick [rad]."""
+    if sim.noise.compass_sigma <= 0.0:
+        return 0.0
+    return sim.noise.compass_sigma * normal(key(sim.clock.seed, i, tick, COMPASS_NOISE))
+
+
+@jit_inline
+def _sense_self(sim: Sim, tick: int, i: int) -> None:
+    """Fill clock, compass, goal and odometry of robot i."""
+    robot, percept = sim.robots[i], sim.percepts[i]
+    heading = robot["yaw"] + _compass_error(sim, tick, i)
+    gx, gy = robot["goal_x"] - robot["x"], robot["goal_y"] - robot["y"]
+    percept["now_s"] = tick * sim.clock.dt
+    percept["speed"] = robot["v"]
+    percept["compass"] = wrap_angle(heading)
+    percept["goal_bearing"] = wrap_angle(math.atan2(gy, gx) - heading)
+    percept["goal_distance"] = math.sqrt(gx * gx + gy * gy)
+    dx, dy = robot["x"] - robot["last_x"], robot["y"] - robot["last_y"]
+    c, s = math.cos(robot["last_yaw"]), math.sin(robot["last_yaw"])
+    percept["odom_x"] = c * dx + s * dy
+    percept["odom_y"] = c * dy - s * dx
+    percept["odom_yaw"] = wrap_angle(robot["yaw"] - robot["last_yaw"])
+    robot["last_x"], robot["last_y"], robot["last_yaw"] = robot["x"], robot["y"], robot["yaw"]
+
+
+@jit
+def _scan_and_neighbours(sim: Sim, tick: int, i: int) -> None:
+    """Cast robot i's scan and list the neighbours in its line of sight, nearest first."""
+    robot, percept, ranges = sim.robots[i], sim.percepts[i], sim.ranges[i]
+    x, y, yaw = robot["x"], robot["y"], robot["yaw"]
+    cast_static(sim.world, x, y, yaw, sim.beams, ranges)
+    reach = sim.beams.range_max + sim.radius
+    c, s = math.cos(yaw), math.sin(yaw)
+    columns = int(sim.cell_layout[2])
+    found = 0
+    for row in range(row_of(sim, y - reach), row_of(sim, y + reach) + 1):
+        begin = sim.cell_start[row * columns + column_of(sim, x - reach)]
+        end = sim.cell_start[row * columns + column_of(sim, x + reach) + 1]
+        for k in range(begin, end):
+            j = sim.cell_items[k]
+            dx, dy = sim.robots[j]["x"] - x, sim.robots[j]["y"] - y
+            if j == i or dx * dx + dy * dy >= reach * reach:
+                continue
+            bx, by = c * dx + s * dy, c * dy - s * dx
+            cast_disc(bx, by, sim.radius, sim.beams, ranges)
+            found = _insert(percept, found, j, bx, by)
+    _keep_visible(sim, tick, i, found)
+    noise = sim.noise
+    if noise.range_sigma > 0.0:
+        add_scan_noise(ranges, key(sim.clock.seed, i, tick, SCAN_NOISE), noise.range_sigma, sim.beams.range_max)
+    if noise.dropout > 0.0:
+        drop_returns(ranges, key(sim.clock.seed, i, tick, SCAN_DROP), noise.dropout)
+    if sim.range_min > 0.0:
+        for n in range(ranges.size):
+            if ranges[n] < sim.range_min:
+                ranges[n] = math.nan
+
+
+@jit_inline
+def _insert(percept: object, found: int, j: int, bx: float, by: float) -> int:
+    """Insert neighbour j into the list sorted by distance; return its new length."""
+    ids, xs, ys = percept["neighbour_id"], percept["neighbour_x"], percept["neighbour_y"]
+    d2 = bx * bx + by * by
+    k = found
+    if found == MAX_NEIGHBOURS:
+        k = found - 1
+        if xs[k] * xs[k] + ys[k] * ys[k] <= d2:
+            return found
+    while k > 0 and xs[k - 1] * xs[k - 1] + ys[k - 1] * ys[k - 1] > d2:
+        ids[k], xs[k], ys[k] = ids[k - 1], xs[k - 1], ys[k - 1]
+        k -= 1
+    ids[k], xs[k], ys[k] = j, bx, by
+    return min(MAX_NEIGHBOURS, found + 1)
+
+
+@jit_inline
+def _keep_visible(sim: Sim, tick: int, i: int, found: int) -> None:
+    """Keep the neighbours in line of sight by robot i's own (noise-free) scan; add the sensor's errors."""
+    percept, ranges, beams, noise = sim.percepts[i], sim.ranges[i], sim.beams, sim.noise
+    ids, xs, ys = percept["neighbour_id"], percept["neighbour_x"], percept["neighbour_y"]
+    error = _compass_error(sim, tick, i)
+    kept = 0
+    for k in range(found):
+        j, x, y = ids[k], xs[k], ys[k]
+        distance = math.sqrt(x * x + y * y)
+        bearing = math.atan2(y, x)
+        n = int(math.floor((bearing - beams.angle_min) / beams.increment + 0.5))
+        if beams.wraps:
+            n = n % ranges.size
+        if n < 0 or n >= ranges.size or ranges[n] < distance - sim.radius - SIGHT_SLACK:
+            continue
+        if noise.position_range_sigma > 0.0 or noise.bearing_sigma > 0.0:
+            bits = mix(key(sim.clock.seed, i, tick, RANGE_NOISE) + key(0, j, 0, RANGE_NOISE))
+            distance *= 1.0 + noise.position_range_sigma * normal(bits)
+            bits = mix(key(sim.clock.seed, i, tick, BEARING_NOISE) + key(0, j, 0, BEARING_NOISE))
+            bearing += noise.bearing_sigma * normal(bits)
+            x, y = distance * math.cos(bearing), distance * math.sin(bearing)
+        ids[kept], xs[kept], ys[kept] = j, x, y
+        heading = sim.robots[j]["yaw"] + _compass_error(sim, tick, j)
+        percept["neighbour_yaw"][kept] = wrap_angle(heading - sim.robots[i]["yaw"] - error)
+        kept += 1
+    percept["n_neighbours"] = kept
+
+
+@jit_inline
+def _receive(sim: Sim, tick: int, i: int) -> None:
+    """Hand over the packets that have arrived, oldest first; the rest stays in the queue."""
+    robot, percept = sim.robots[i], sim.percepts[i]
+    now = tick * sim.clock.dt + 1e-9
+    taken, kept = 0, 0
+    for q in range(robot["queued"]):
+        if sim.queue_due[i, q] <= now and taken < MAX_INBOX:
+            percept["packet_length"][taken] = sim.queue_length[i, q]
+            for b in range(sim.queue_length[i, q]):
+                percept["packet"][taken, b] = sim.queue_data[i, q, b]
+            taken += 1
+            continue
+        if kept != q:
+            sim.queue_due[i, kept] = sim.queue_due[i, q]
+            sim.queue_length[i, kept] = sim.queue_length[i, q]
+            sim.queue_from[i, kept] = sim.queue_from[i, q]
+            for b in range(sim.queue_length[i, q]):
+                sim.queue_data[i, kept, b] = sim.queue_data[i, q, b]
+        kept += 1
+    robot["queued"] = kept
+    percept["n_packets"] = taken

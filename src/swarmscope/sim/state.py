@@ -1,0 +1,208 @@
+"""The arrays of a running simulation: robots, radio queues, records, and the constants of its sensors and radio."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from swarmscope.onboard.percept import DECISION, PERCEPT, Rig, Scratch, new_scratch, new_shared
+from swarmscope.onboard.sharing.message import MAX_PACKET_BYTES
+from swarmscope.sim.lidar import Beams
+from swarmscope.sim.world import World
+
+QUEUE = 32
+"""Packets on their way to one robot; one more is lost and counted."""
+
+ROBOT = np.dtype(
+    [
+        ("x", np.float64),
+        ("y", np.float64),
+        ("yaw", np.float64),
+        ("v", np.float64),
+        ("last_x", np.float64),
+        ("last_y", np.float64),
+        ("last_yaw", np.float64),
+        ("goal_x", np.float64),
+        ("goal_y", np.float64),
+        ("crashed", np.uint8),
+        ("arrived", np.uint8),
+        ("arrival_s", np.float64),
+        ("length", np.float64),
+        ("waited_s", np.float64),
+        ("clearance", np.float64),  # smallest in the last tick, to anything [m]
+        ("min_clearance", np.float64),
+        ("fusions", np.int64),
+        ("sent", np.int64),  # packets
+        ("sent_features", np.int64),
+        ("bytes", np.int64),  # payload
+        ("feature_bytes", np.int64),
+        ("air_bytes", np.int64),  # payload and the link's own overhead
+        ("lost", np.int64),  # by chance
+        ("unreachable", np.int64),  # out of range
+        ("crowded", np.int64),  # no bandwidth or no room in the queue
+        ("radio_free_s", np.float64),  # when its radio is free again
+        ("queued", np.int64),
+    ]
+)
+
+
+class Noise(NamedTuple):
+    """Sensor errors: fractions of the distance, radians, probabilities."""
+
+    range_sigma: float = 0.0
+    dropout: float = 0.0
+    position_range_sigma: float = 0.0
+    bearing_sigma: float = 0.0
+    compass_sigma: float = 0.0
+
+
+class Radio(NamedTuple):
+    """The link. Each packet occupies sender and receiver for its time on the air."""
+
+    range_m: float = 15.0
+    latency_s: float = 0.005
+    loss: float = 0.0
+    bitrate: float = 78125.0
+    overhead_bytes: int = 23
+    """Preamble, header and checksum of the link layer per packet (IEEE 802.15.4: 6 + 15 + 2)."""
+    max_wait_s: float = 0.5
+    """A packet that would wait longer for the channel is dropped."""
+
+
+class Clock(NamedTuple):
+    """Time of the simulation."""
+
+    seed: int
+    dt: float
+    substeps: int
+
+
+class Records(NamedTuple):
+    """What is kept of each tick, (ticks, robots)."""
+
+    x: np.ndarray
+    y: np.ndarray
+    yaw: np.ndarray
+    speed: np.ndarray
+    clearance: np.ndarray
+    p_left: np.ndarray
+    state: np.ndarray
+    reason: np.ndarray
+    side: np.ndarray
+    neighbours: np.ndarray
+    bytes_sent: np.ndarray
+    scan: np.ndarray
+    safe: np.ndarray
+
+
+class Sim(NamedTuple):
+    """Everything the world's kernels work on."""
+
+    world: World
+    beams: Beams
+    robots: np.ndarray
+    percepts: np.ndarray
+    decisions: np.ndarray
+    ranges: np.ndarray
+    queue_due: np.ndarray
+    queue_length: np.ndarray
+    queue_from: np.ndarray
+    queue_data: np.ndarray
+    path: np.ndarray
+    cell_of: np.ndarray
+    cell_start: np.ndarray
+    cell_items: np.ndarray
+    cell_layout: np.ndarray
+    links: np.ndarray
+    links_n: np.ndarray
+    radius: float
+    v_max: float
+    a_max: float
+    w_max: float
+    range_min: float
+    noise: Noise
+    radio: Radio
+    clock: Clock
+
+
+CELL_M = 2.5
+"""Side of the cells in which robots look for neighbours [m]."""
+LINKS = 65536
+"""Feature deliveries kept for the replay page."""
+
+
+def new_sim(
+    world: World,
+    bounds: tuple[float, float, float, float],
+    beams: Beams,
+    rig: Rig,
+    starts: np.ndarray,
+    goals: np.ndarray,
+    noise: Noise,
+    radio: Radio,
+    clock: Clock,
+) -> tuple[Sim, np.ndarray, Scratch]:
+    """Return the simulation at its start, the robots' shared memories and their working arrays."""
+    n = len(starts)
+    robots = np.zeros(n, ROBOT)
+    for k, name in enumerate(("x", "y", "yaw")):
+        robots[name] = starts[:, k]
+        robots[f"last_{name}"] = starts[:, k]
+    robots["goal_x"], robots["goal_y"] = goals[:, 0], goals[:, 1]
+    robots["arrival_s"] = np.nan
+    robots["min_clearance"] = np.inf
+    robots["clearance"] = np.inf
+    percepts = np.zeros(n, PERCEPT)
+    percepts["id"] = np.arange(n)
+    percepts["dt_s"] = clock.dt
+    decisions = np.zeros(n, DECISION)
+    decisions["p_self"] = np.nan
+    decisions["p_left"] = np.nan
+    columns = max(1, int(np.ceil((bounds[2] - bounds[0]) / CELL_M)))
+    rows = max(1, int(np.ceil((bounds[3] - bounds[1]) / CELL_M)))
+    sim = Sim(
+        world=world,
+        beams=beams,
+        robots=robots,
+        percepts=percepts,
+        decisions=decisions,
+        ranges=np.full((n, rig.sensor.beams), np.inf, np.float32),
+        queue_due=np.zeros((n, QUEUE)),
+        queue_length=np.zeros((n, QUEUE), np.int64),
+        queue_from=np.zeros((n, QUEUE), np.int64),
+        queue_data=np.zeros((n, QUEUE, MAX_PACKET_BYTES), np.uint8),
+        path=np.zeros((n, clock.substeps + 1, 2)),
+        cell_of=np.zeros(n, np.int64),
+        cell_start=np.zeros(columns * rows + 1, np.int64),
+        cell_items=np.zeros(n, np.int64),
+        cell_layout=np.array([bounds[0], bounds[1], float(columns), float(rows)]),
+        links=np.zeros((LINKS, 4), np.int32),
+        links_n=np.zeros(1, np.int64),
+        radius=float(rig.body.radius),
+        v_max=float(rig.body.v_max),
+        a_max=float(rig.body.a_max),
+        w_max=float(rig.body.w_max),
+        range_min=float(rig.sensor.range_min),
+        noise=Noise(*(float(v) for v in noise)),
+        radio=radio,
+        clock=clock,
+    )
+    return sim, new_shared(n), new_scratch(n, rig)
+
+
+def new_records(ticks: int, robots: int, beams: int) -> Records:
+    """Return room for ``ticks`` ticks; ``beams == 0`` keeps no scans."""
+    shape = (ticks, robots)
+    scans = ticks if beams else 0
+    return Records(
+        *(np.zeros(shape) for _ in range(3)),
+        *(np.zeros(shape, np.float32) for _ in range(3)),
+        np.zeros(shape, np.uint8),
+        np.zeros(shape, np.uint8),
+        np.zeros(shape, np.int8),
+        np.zeros(shape, np.uint8),
+        np.zeros(shape, np.int32),
+        np.zeros((scans, robots, beams), np.uint8),
+        np.zeros((scans, robots, (beams + 7) // 8), np.uint8),
+    )

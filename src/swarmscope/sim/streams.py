@@ -1,0 +1,77 @@
+"""Random numbers keyed by (seed, robot, tick, purpose): the same whatever the order or the number of threads."""
+
+from __future__ import annotations
+
+from statistics import NormalDist
+
+import numpy as np
+
+from swarmscope._jit import jit, jit_inline
+
+SCAN_NOISE, SCAN_DROP, RANGE_NOISE, BEARING_NOISE, COMPASS_NOISE, RADIO_LOSS = range(1, 7)
+"""Purposes."""
+
+_LEVELS = 4096
+_quantiles = np.array([NormalDist().inv_cdf((k + 0.5) / _LEVELS) for k in range(_LEVELS)])
+NORMAL_TABLE = (_quantiles / _quantiles.std()).astype(np.float32)
+"""Quantiles of the normal distribution, unit variance, cut at 3.7 sigma: 12 random bits pick one."""
+
+_A = np.uint64(0x9E3779B97F4A7C15)
+_B = np.uint64(0xBF58476D1CE4E5B9)
+_C = np.uint64(0x94D049BB133111EB)
+_S30, _S27, _S31, _S11 = np.uint64(30), np.uint64(27), np.uint64(31), np.uint64(11)
+_MASK = np.uint64(_LEVELS - 1)
+_S12 = np.uint64(12)
+
+
+@jit_inline
+def mix(z: int) -> int:
+    """Return the splitmix64 finaliser of ``z`` (uint64): every input bit reaches every output bit."""
+    z = (z ^ (z >> _S30)) * _B
+    z = (z ^ (z >> _S27)) * _C
+    return z ^ (z >> _S31)
+
+
+@jit
+def key(seed: int, robot: int, tick: int, purpose: int) -> int:
+    """Return the start (uint64) of the stream for this seed, robot, tick and purpose."""
+    k = mix(np.uint64(seed) + _A)
+    k = mix(k + np.uint64(robot) * _A + np.uint64(1))
+    k = mix(k + np.uint64(tick) * _A + np.uint64(2))
+    return mix(k + np.uint64(purpose) * _A + np.uint64(3))
+
+
+@jit_inline
+def uniform(k: int) -> float:
+    """Return a number in [0, 1) from the random bits ``k``."""
+    return float(k >> _S11) * 1.1102230246251565e-16
+
+
+@jit_inline
+def normal(k: int) -> float:
+    """Return a standard normal number from the random bits ``k``."""
+    return float(NORMAL_TABLE[int(k & _MASK)])
+
+
+@jit
+def add_scan_noise(ranges: np.ndarray, k: int, sigma: float, range_max: float) -> None:
+    """Multiply every return by (1 + sigma * normal); what leaves ``range_max`` is no return (+inf)."""
+    state = k
+    bits = k
+    for n in range(ranges.size):
+        if n % 4 == 0:
+            state = state + _A
+            bits = mix(state)
+        s = ranges[n] * (1.0 + sigma * NORMAL_TABLE[int(bits & _MASK)])
+        bits = bits >> _S12
+        ranges[n] = np.inf if s > range_max else s
+
+
+@jit
+def drop_returns(ranges: np.ndarray, k: int, probability: float) -> None:
+    """Lose each return with ``probability``: no return (+inf) instead."""
+    state = k
+    for n in range(ranges.size):
+        state = state + _A
+        if uniform(mix(state)) < probability:
+            ranges[n] = np.inf

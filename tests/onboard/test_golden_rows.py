@@ -1,0 +1,96 @@
+"""The golden rows of the published documents, as we read them (readings 1, 7-9, 11)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from swarmscope.onboard.perception.areas import normalise, passable_distance, quadrant_area
+from swarmscope.onboard.planning.fields import (
+    following_probability,
+    fuse,
+    interaction_force,
+    left_probability,
+    neighbour_weight,
+)
+from swarmscope.onboard.robot import Body, protection_model
+
+ALPHA_HALF = math.radians(36.0)
+TABLE_II = {
+    "R3": [[54, 1.62], [83, 1.53], [128, 1.78], [177, 1.55], [231, 1.89], [282, 1.55], [302, 1.58], [359, 1.18]],
+    "R2": [[15, 1.60], [43, 1.67], [117, 1.24], [179, 1.83], [285, 1.03], [341, 1.77]],
+    "R4": [[8, 1.78], [109, 1.17], [176, 1.85], [237, 1.27], [300, 1.69], [329, 1.62]],
+}
+
+
+def table(name):
+    rows = np.array(TABLE_II[name])
+    return np.radians(rows[:, 0]), rows[:, 1].copy(), len(rows)
+
+
+def passable(name, chords):
+    features = table(name)
+    return (
+        passable_distance(*features, 0.0, ALPHA_HALF, chords),
+        passable_distance(*features, -ALPHA_HALF, 0.0, chords),
+    )
+
+
+def test_simulated_robot_has_the_published_protection_model():
+    p = protection_model(Body())
+    assert p.r == pytest.approx(0.30, abs=1e-9)
+    assert p.l_th == pytest.approx(0.60, abs=1e-9)
+    assert math.degrees(p.alpha) == pytest.approx(60.0, abs=1e-9)
+    assert p.sigma_a == pytest.approx(0.90, abs=1e-9)
+
+
+def test_real_robot_has_the_published_protection_model():
+    body = Body(radius=0.43, half_width=0.29, v_max=0.5, a_max=4.0, sensor_delay=0.0575)
+    p = protection_model(body)
+    assert p.r == pytest.approx(0.49, abs=1e-9)
+    assert p.l_th == pytest.approx(0.83, abs=0.005)
+    assert math.degrees(p.alpha) == pytest.approx(72.6, abs=0.05)
+    assert p.sigma_a == pytest.approx(1.10, abs=1e-9)
+
+
+def test_threshold_of_table_ii_is_1_54():
+    body = Body(radius=0.43, half_width=0.29, v_max=0.5, a_max=4.0, sensor_delay=0.0575)
+    assert normalise(protection_model(body).w_n, 5.0) == pytest.approx(1.54, abs=0.002)
+
+
+def test_own_probability_of_r3():
+    features = table("R3")
+    h, q = ALPHA_HALF, math.pi / 2
+    areas = [quadrant_area(*features, *span, True) for span in ((0, h), (-h, 0), (h, q), (-q, -h))]
+    assert left_probability(*areas) == pytest.approx(0.5042, abs=5e-5)
+
+
+def test_following_probability_of_r2():
+    x_1, x_2 = passable("R2", False)
+    assert x_1 == pytest.approx(1.638, abs=1e-3)
+    assert x_2 == pytest.approx(1.770, abs=1e-9)
+    assert following_probability(x_1, x_2, 1.54, True) == pytest.approx(0.581, abs=5e-4)
+
+
+def test_following_probability_of_r4():
+    assert following_probability(*passable("R4", True), 1.54, False) == pytest.approx(0.4137, abs=5e-5)
+
+
+def test_fusion_of_table_ii():
+    p = np.array([0.395, 0.581, 0.403, 0.414])
+    f = np.array([0.236, 0.279, 0.266, 0.247])
+    assert fuse(0.504, float(p @ f), float(f.sum())) == pytest.approx(0.478, abs=5e-4)
+
+
+def test_weight_by_adaboost():
+    assert neighbour_weight(0.245, 0.446) == pytest.approx(0.193, abs=5e-4)
+
+
+def test_largest_attraction():
+    r = np.linspace(0.9, 9.0, 20001)
+    f = np.array([interaction_force(d, 0.9, 1.0) for d in r])
+    assert f.max() == pytest.approx(0.180, abs=5e-4)
+    assert r[f.argmax()] / 0.9 == pytest.approx(1.477, abs=2e-3)
+    assert interaction_force(0.9, 0.9, 1.0) == pytest.approx(0.0, abs=1e-12)
