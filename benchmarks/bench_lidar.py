@@ -14,7 +14,7 @@ import numpy as np
 
 from swarmscope.geometry import ray_circle
 from swarmscope.sim.contact import static_clearance
-from swarmscope.sim.lidar import cast_static, make_beams
+from swarmscope.sim.lidar import Beams, cast_static, make_beams
 from swarmscope.sim.maps import load_map, packaged_map
 from swarmscope.sim.world import Circle, World, WorldSpec, compile_world
 
@@ -32,7 +32,7 @@ def forest(seed: int = 0) -> World:
 
 
 @numba.njit
-def scan_all(world, poses, beams, out):
+def scan_all(world: World, poses: np.ndarray, beams: Beams, out: np.ndarray) -> float:
     """Scan from every pose."""
     total = 0.0
     for i in range(poses.shape[0]):
@@ -42,7 +42,7 @@ def scan_all(world, poses, beams, out):
 
 
 @numba.njit(error_model="numpy")
-def scan_all_plain(world, poses, beams, out):
+def scan_all_plain(world: World, poses: np.ndarray, beams: Beams, out: np.ndarray) -> float:
     """Scan from every pose, asking every beam about every circle."""
     total = 0.0
     for i in range(poses.shape[0]):
@@ -59,7 +59,7 @@ def scan_all_plain(world, poses, beams, out):
 
 
 @numba.njit
-def clearance_all(world, poses, limit):
+def clearance_all(world: World, poses: np.ndarray, limit: float) -> float:
     """Ask for the clearance of a short step from every pose."""
     total = 0.0
     for i in range(poses.shape[0]):

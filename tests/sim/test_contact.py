@@ -196,3 +196,13 @@ def test_a_path_is_as_clear_as_the_less_clear_of_its_parts(seed, share):
     middle = a + share * (b - a)
     parts = min(clearance(world, a, middle), clearance(world, middle, b))
     assert clearance(world, a, b) == pytest.approx(parts, abs=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_a_wall_is_found_from_anywhere_along_it_with_a_small_limit(seed):
+    rng = np.random.default_rng(seed)
+    a, b = rng.uniform(0, 10, (2, 2))
+    world = world_of(Wall(points=[a, b]))
+    normal = np.array([a[1] - b[1], b[0] - a[0]]) / np.linalg.norm(b - a)
+    for share in np.linspace(0, 1, 101):
+        assert clearance(world, a + share * (b - a) + 0.02 * normal, limit=0.03) == pytest.approx(0.02)

@@ -248,3 +248,13 @@ def test_office_map_agrees_with_small_steps():
         solid = within & (world.solid[np.where(within, rows, 0), np.where(within, columns, 0)] == 1)
         walked = np.where(solid.any(axis=1), steps[solid.argmax(axis=1)], np.inf)
         assert np.mean(~np.isclose(found, walked, rtol=0, atol=0.0021)) < 0.03  # steps skip cut corners
+
+
+@pytest.mark.parametrize("height", [1e-3, -1e-3, 1e-9])
+def test_a_sensor_all_but_on_a_wall_sees_it_on_the_right_side(height):
+    world = world_of(Wall(points=[(-0.5, 0), (0.5, 0)]))
+    beams = make_beams(360, FULL, 5.0)
+    for yaw in np.linspace(-3, 3, 13):
+        assert_same_ranges(
+            scan(world, (0.01, height, yaw), beams), plain_scan(world, (0.01, height, yaw), beams)
+        )

@@ -17,7 +17,7 @@ mujoco = pytest.importorskip(
 
 SIDE_M, RANGE_M, BEAMS = 10.0, 5.0, 360
 ROBOT_RADIUS_M = 0.15
-HALF_THICK_M = 1e-6
+HALF_THICK_M = 1e-9
 SEEDS = range(24)
 
 
@@ -123,7 +123,7 @@ def test_all_ranges_agree_with_mujoco():
             differing += np.count_nonzero(~np.isclose(out, expected, rtol=0, atol=1e-5))
             total += BEAMS
     print(f"{differing} of {total} ranges differ by more than 1e-5 m")
-    assert differing < 0.005 * total
+    assert differing <= 0.0002 * total  # rays that graze a surface
 
 
 @pytest.mark.parametrize("seed", SEEDS)

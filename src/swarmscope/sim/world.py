@@ -352,11 +352,11 @@ def _spread_gap(gap: Bytes) -> None:
                 right = col - 1 if backward else col + 1
                 least = int(gap[row, col])
                 if 0 <= left < width:
-                    least = min(least, gap[row, left] + 1)
+                    least = min(least, int(gap[row, left]) + 1)
                 if 0 <= before < height:
-                    least = min(least, gap[before, col] + 1)
+                    least = min(least, int(gap[before, col]) + 1)
                     if 0 <= left < width:
-                        least = min(least, gap[before, left] + 1)
+                        least = min(least, int(gap[before, left]) + 1)
                     if 0 <= right < width:
-                        least = min(least, gap[before, right] + 1)
+                        least = min(least, int(gap[before, right]) + 1)
                 gap[row, col] = least
