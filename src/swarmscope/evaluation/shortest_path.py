@@ -8,7 +8,8 @@ shorter than the straight line. An 8-connected way is up to 8.2 % longer than th
 *Any-angle*: in worlds of circles, the exact shortest way of a disc of radius r0: straight lines and arcs,
 found in the tangent graph of the inflated circles (which may overlap). In worlds with walls, polygons or a
 grid, or where more than `MOST_DISCS` circles matter, the A* way pulled taut: an upper bound, marked
-``exact=False`` (`docs` of `pulled_path`).
+``exact=False``; on 900 ways through forests it was 0.2 to 0.7 % longer than the exact one on average
+and 4.2 % at most (`benchmarks/bench_paths.py`).
 """
 
 from __future__ import annotations
@@ -90,8 +91,7 @@ def pulled_path(world: World, way: ShortestPath, radius: float) -> ShortestPath:
     obstacles.
 
     Steps of the way itself are kept as they are, so the result is never longer. It is an upper bound on the
-    shortest way among those that pass the obstacles on the same sides or cut across; `tests` measure how
-    much it is above it.
+    shortest way, up to the millimetres by which a step between free cells may come closer than ``radius``.
     """
     if len(way.points) < 3:
         return way

@@ -1,7 +1,7 @@
 """How sure a figure is: intervals for means, shares and paired differences. Seeded, so the same data give
 the same.
 
-NaN is not data: values (or pairs) that are not finite are left out, and ``count`` says how many entered.
+NaN is not data: values (or pairs) that are not finite are left out, and ``used`` says how many entered.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class Interval(NamedTuple):
     estimate: float
     low: float
     high: float
-    count: int
+    used: int
 
 
 class PairedDifference(NamedTuple):
@@ -34,7 +34,7 @@ class PairedDifference(NamedTuple):
     estimate: float
     low: float
     high: float
-    count: int
+    used: int
     p_value: float  # two-sided; sign-flip test
 
 
