@@ -78,8 +78,8 @@ def crc16(data: np.ndarray, length: int, init: int = CRC_INIT) -> int:
 
     With ``init=0xFFFF`` it is CRC-16/CCITT-FALSE.
     """
-    crc = int(init)
-    for i in range(length):
+    crc = int(init) & 0xFFFF
+    for i in range(min(length, data.size)):
         crc = ((crc & 0xFF) << 8) ^ _CRC_TABLE[(crc >> 8) ^ int(data[i])]
     return crc
 
@@ -246,6 +246,14 @@ def encode_exact_features(
 
 
 @jit_inline
+def _packet_bytes(kind: int, n: int) -> int:
+    """Return how long a packet of ``kind`` with ``n`` features is."""
+    if kind == KIND_REQUEST:
+        return REQUEST_BYTES
+    return _HEAD + 2 + (2 if kind == KIND_FEATURES else 8) * n
+
+
+@jit_inline
 def _check(data: np.ndarray, length: int) -> int:
     """Return the status of a packet: cheap tests first, the checksum last."""
     if length < REQUEST_BYTES or length > data.size:
@@ -256,15 +264,10 @@ def _check(data: np.ndarray, length: int) -> int:
     kind = first & 0xF
     if kind < KIND_REQUEST or kind > KIND_EXACT_FEATURES:
         return BAD_KIND
-    expected = REQUEST_BYTES
-    if kind != KIND_REQUEST:
-        if length < _HEAD + 2:
-            return TOO_SHORT
-        n = int(data[7])
-        if n > MAX_FEATURES:
-            return BAD_LENGTH
-        expected = _HEAD + 2 + (2 if kind == KIND_FEATURES else 8) * n
-    if length != expected:
+    if kind != KIND_REQUEST and length < _HEAD + 2:
+        return TOO_SHORT
+    n = int(data[7]) if kind != KIND_REQUEST else 0
+    if n > MAX_FEATURES or length != _packet_bytes(kind, n):
         return BAD_LENGTH
     return OK if crc16(data, length - 2, CRC_INIT) == _get_u16(data, length - 2) else BAD_CHECKSUM
 
@@ -296,11 +299,13 @@ def read_features(
 
     Angles [rad, compass frame] are ascending in [0, 2 pi), distances [m] in [0, range_max]. 0 for a request.
     """
-    kind = int(data[0]) & 0xF
-    if kind == KIND_REQUEST or length < _HEAD + 2:
+    if length < _HEAD + 2 or length > data.size:
         return 0
-    n = _usable(int(data[7]), angles, distances)
+    kind = int(data[0]) & 0xF
     sent = int(data[7])
+    if length != _packet_bytes(kind, sent):
+        return 0
+    n = _usable(sent, angles, distances)
     for k in range(n):
         if kind == KIND_FEATURES:
             angle = _angle_of(int(data[_HEAD + k]))
