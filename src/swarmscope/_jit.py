@@ -17,10 +17,19 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def jit(function: F) -> F:
-    """Compile ``function`` in nopython mode, cached on disk."""
+    """Compile ``function`` in nopython mode, cached on disk; it may not allocate.
+
+    Without Numba's runtime (``_nrt=False``) arrays are not reference-counted, which costs more than the work in
+    short kernels, and a kernel that allocates does not compile.
+    """
+    return cast("F", numba.njit(cache=True, nogil=True, error_model="numpy", _nrt=False)(function))
+
+
+def jit_alloc(function: F) -> F:
+    """Compile ``function`` in nopython mode, cached on disk; it may allocate (set-up and evaluation, no hot path)."""
     return cast("F", numba.njit(cache=True, nogil=True, error_model="numpy")(function))
 
 
 def jit_inline(function: F) -> F:
     """Compile a tiny scalar helper so that LLVM always inlines it into its caller."""
-    return cast("F", numba.njit(cache=True, nogil=True, error_model="numpy", forceinline=True)(function))
+    return cast("F", numba.njit(cache=True, nogil=True, error_model="numpy", forceinline=True, _nrt=False)(function))

@@ -83,6 +83,15 @@ class GuardModel(_Strict):
     persistence_s: NotNegative = 2.0
 
 
+class SafetyModel(_Strict):
+    """Which directions count as safe."""
+
+    sector: bool = True
+    look_ahead_m: NotNegative = 0.0
+    margin_m: NotNegative = 0.0
+    narrow_m: NotNegative = 0.0
+
+
 class TaskModel(_Strict):
     """A task by name, with its options."""
 
@@ -126,6 +135,7 @@ class Scenario(_Strict):
     noise: NoiseModel = NoiseModel()
     radio: RadioModel = RadioModel()
     guard: GuardModel = GuardModel()
+    safety: SafetyModel = SafetyModel()
     limit_s: Positive = 300.0
     substeps: Annotated[int, Field(ge=1, le=1000)] = 20
     record_scans: Literal["auto", "yes", "no"] = "auto"
@@ -248,6 +258,10 @@ def make_rig_of(scenario: Scenario) -> Rig:
         clearance=scenario.guard.clearance_m,
         persistence=scenario.guard.persistence_s,
         exact_features=scenario.radio.exact_features,
+        sector=scenario.safety.sector,
+        look_ahead=scenario.safety.look_ahead_m,
+        margin=scenario.safety.margin_m,
+        narrow=scenario.safety.narrow_m,
     )
 
 

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from swarmscope.onboard.perception.filters import feature_filter, window_half
+from swarmscope.onboard.perception.safety import reach_table
 from swarmscope.onboard.robot import Body, Protection, protection_model
 from swarmscope.onboard.sharing.message import MAX_FEATURES, MAX_PACKET_BYTES
 
@@ -145,6 +146,8 @@ class Rig(NamedTuple):
     """Features older than this are not used [s]."""
     exact_features: bool
     """Send float32 features instead of quantised ones (to measure what quantisation costs)."""
+    reach: np.ndarray
+    """(3, BINS) int16: what a return blocks, for the safe directions, the narrow gaps and the escape."""
     cos: np.ndarray
     sin: np.ndarray
     taps: np.ndarray
@@ -162,6 +165,8 @@ class Scratch(NamedTuple):
     edges: np.ndarray
     """(N, M + 1) int16."""
     safe: np.ndarray
+    """(N, M) uint8."""
+    narrow: np.ndarray
     """(N, M) uint8."""
     angles: np.ndarray
     """(N, 2, MAX_FEATURES) float64."""
@@ -181,17 +186,30 @@ def make_rig(
     persistence: float = 2.0,
     max_feature_age: float = 1.5,
     exact_features: bool = False,
+    sector: bool = True,
+    look_ahead: float = 0.0,
+    margin: float = 0.0,
+    narrow: float = 0.0,
 ) -> Rig:
     """Return the constants of a robot with ``body`` and ``sensor``; raises ConfigError for an impossible body."""
     protection = protection_model(body)
     half = window_half(protection.alpha, sensor.increment)
     angles = sensor.angle_min + sensor.increment * np.arange(sensor.beams)
+    footprint = body.radius + footprint_clearance
+    half_alpha = 0.5 * protection.alpha if sector else 0.0
+    rules = (
+        (protection.l_th, half_alpha, look_ahead, body.radius + margin),
+        (narrow, 0.0, 0.0, 0.0),
+        (protection.r, 0.0, 0.0, 0.0),
+    )
+    reach = np.stack([reach_table(sensor.increment, sensor.range_max, footprint, *rule) for rule in rules])
     return Rig(
+        reach=reach,
         body=Body(*(float(v) for v in body)),
         protection=protection,
         sensor=sensor,
         half=half,
-        footprint=body.radius + footprint_clearance,
+        footprint=footprint,
         clearance=clearance,
         latency=latency,
         persistence=persistence,
@@ -212,6 +230,7 @@ def new_scratch(robots: int, rig: Rig) -> Scratch:
         padded=np.zeros((robots, beams + 2 * rig.half), np.float32),
         edges=np.zeros((robots, beams + 1), np.int16),
         safe=np.zeros((robots, beams), np.uint8),
+        narrow=np.zeros((robots, beams), np.uint8),
         angles=np.zeros((robots, 2, MAX_FEATURES)),
         distances=np.zeros((robots, 2, MAX_FEATURES)),
         header=np.zeros((robots, 5), np.int64),

@@ -43,15 +43,7 @@ def begin(
     mask_moving_neighbours(ranges, percept, shared, rig, still_s, work)
     sensor = rig.sensor
     return safe_directions(
-        work,
-        sensor.range_min,
-        sensor.increment,
-        sensor.wraps,
-        rig.protection.l_th,
-        rig.half,
-        rig.footprint,
-        edges,
-        safe,
+        work, sensor.range_min, sensor.range_max, sensor.wraps, rig.reach[0], edges, safe
     )
 
 

@@ -154,10 +154,12 @@ def _in_own_half(
     if s <= 1e-6:
         return x5 * x5 + y5 * y5 < 1e-9
     nx, ny = px / s, py / s
-    towards = max(x4 * nx + y4 * ny, x5 * nx + y5 * ny)
+    moved = x4 * nx + y4 * ny
+    stopped = x5 * nx + y5 * ny
+    towards = max(moved, stopped)
     if towards <= 1e-6:
         return True
-    return towards + brake <= 0.5 * (s - rig.body.radius) - rig.clearance
+    return towards + max(0.0, stopped - moved) <= 0.5 * (s - rig.body.radius - rig.clearance)
 
 
 @jit_inline

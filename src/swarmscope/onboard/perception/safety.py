@@ -9,63 +9,75 @@ import numpy as np
 from swarmscope._jit import jit, jit_inline
 
 
-@jit_inline
-def blocking_half_angle(s: float, l_th: float, half_alpha: float, footprint: float) -> float:
+BINS = 512
+"""Entries of a reach table over [0, range_max): 1 cm each at 5 m."""
+
+
+def blocking_half_angle(
+    s: float, footprint: float, l_th: float, half_alpha: float, look_ahead: float, margin: float
+) -> float:
     """Return how far [rad] to either side a return at range ``s`` [m] makes directions unsafe (0 = not at all).
 
-    Nav-SCOPE (3): everything within alpha/2 when ``s < l_th``. Swept footprint: a disc of radius ``footprint``
-    that leaves along a direction clips the return unless it is asin(footprint / s) away; the whole half-plane
-    when the return is closer than the footprint.
+    The largest of three rules. Nav-SCOPE (3): alpha/2 when ``s < l_th``. Swept footprint (readings 3): a disc
+    of radius ``footprint`` that leaves along a direction clips the return unless it is asin(footprint / s)
+    away, the whole half-plane when the return is closer than the footprint. Look-ahead: a way that keeps
+    ``margin`` from the return, asin(margin / s), when ``s < look_ahead``.
     """
-    if not s < l_th:
-        return 0.0
-    if s <= footprint:
-        return 0.5 * math.pi
-    return max(half_alpha, math.asin(footprint / s))
+    half = 0.0
+    if s < l_th:
+        half = max(half_alpha, math.asin(min(1.0, footprint / s)) if s > footprint else 0.5 * math.pi)
+    if s < look_ahead:
+        half = max(half, math.asin(margin / s) if s > margin else 0.5 * math.pi)
+    return half
+
+
+def reach_table(
+    increment: float,
+    range_max: float,
+    footprint: float,
+    l_th: float,
+    half_alpha: float,
+    look_ahead: float,
+    margin: float,
+) -> np.ndarray:
+    """Return, for each range bin, how many beams to either side a return blocks; -1 = none. (BINS,) int16.
+
+    Rounded to the safe side: a bin blocks what the nearest range in it blocks.
+    """
+    table = np.empty(BINS, np.int16)
+    for k in range(BINS):
+        half = blocking_half_angle(k * range_max / BINS, footprint, l_th, half_alpha, look_ahead, margin)
+        table[k] = math.ceil(half / increment - 1e-6) if half > 0.0 else -1
+    return table
 
 
 @jit
 def safe_directions(
-    ranges: np.ndarray,
-    range_min: float,
-    increment: float,
-    wraps: bool,
-    l_th: float,
-    half: int,
-    footprint: float,
-    edges: np.ndarray,
-    safe: np.ndarray,
+    ranges: np.ndarray, range_min: float, range_max: float, wraps: bool, reach: np.ndarray, edges: np.ndarray, safe: np.ndarray
 ) -> int:
     """Write 1 into ``safe (M,)`` for each beam direction that is safe, else 0; return how many are.
 
-    ``half`` is alpha/2 in beams, ``edges (M + 1,)`` is scratch. Equivalent to (5), y_1 >= l_th on the scan
-    truncated to l_th, wherever no return is so close that its footprint is wider than alpha/2. With a limited
-    field of view a direction whose window leaves it is not safe.
+    ``reach (BINS,)`` comes from ``reach_table``; ``edges (M + 1,)`` is scratch. With the sector rule alone this
+    is (5), y_1 >= l_th on the scan truncated to l_th. Invalid beams count as range 0. With a limited
+    field of view a direction whose alpha/2 window leaves it is not safe (``range 0`` reaches a quarter turn).
     """
     beams = ranges.size
     for n in range(beams + 1):
         edges[n] = 0
-    sine = math.sin(half * increment)
-    wide = footprint / sine if sine > 0.0 else math.inf
+    scale = BINS / range_max
     for n in range(beams):
         s = ranges[n]
-        if s >= l_th:
+        if s >= range_max:
             continue
-        reach = half
-        if not s >= range_min or s <= footprint:
-            reach = int(math.ceil(0.5 * math.pi / increment))
-        elif s < wide:
-            reach = max(half, int(math.ceil(math.asin(footprint / s) / increment)))
-        _block(edges, beams, wraps, n - reach, n + reach)
+        k = reach[int(s * scale)] if s >= range_min else reach[0]
+        if k >= 0:
+            _block(edges, beams, wraps, n - k, n + k)
     depth = 0
     count = 0
     for n in range(beams):
         depth += edges[n]
-        free = depth == 0
-        if not wraps and (n < half or n >= beams - half):
-            free = False
-        safe[n] = free
-        count += free
+        safe[n] = depth == 0
+        count += depth == 0
     return count
 
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from swarmscope._jit import jit, jit_inline
-from swarmscope.geometry import TWO_PI, wrap_angle
+from swarmscope.geometry import TWO_PI, angle_from, wrap_angle
 from swarmscope.onboard.control.guard import halt, head_for
 from swarmscope.onboard.control.unicycle import arrival_speed
 from swarmscope.onboard.percept import PEERS, Rig, Scratch
@@ -62,6 +62,8 @@ class Params(NamedTuple):
     """A neighbour that has not moved for so long is an obstacle."""
     wait_s: float = 2.0
     """Longest wait for a neighbour to pass; after it the neighbour is an obstacle for the same time."""
+    wide_turn: float = 1.0
+    """Turn from the target [rad] beyond which narrower gaps are looked for."""
     loop_m: float = 1.0
     """A second choice of side this close to an earlier one, without progress, is a loop."""
 
@@ -143,6 +145,7 @@ def step(
         work,
         safe,
         safe_count,
+        scratch.narrow[row],
         edges,
         angles,
         distances,
@@ -181,6 +184,7 @@ def decide(
     masked: np.ndarray,
     safe: np.ndarray,
     safe_count: int,
+    narrow: np.ndarray,
     edges: np.ndarray,
     features: np.ndarray,
     distances: np.ndarray,
@@ -227,7 +231,7 @@ def decide(
         if memory["mode"] != FOLLOW:
             if not _decide_side(percept, shared, memory, decision, rig, params, features, distances, count):
                 return
-        _follow(ranges, masked, percept, memory, decision, safe, safe_count, edges, rig, speed)
+        _follow(ranges, masked, percept, memory, decision, safe, safe_count, narrow, edges, rig, params, speed)
     _yield(percept, shared, memory, decision, rig, params)
     memory["heading"] = percept["compass"] + decision["heading"]
 
@@ -356,8 +360,10 @@ def _follow(
     decision: np.ndarray,
     safe: np.ndarray,
     safe_count: int,
+    narrow: np.ndarray,
     edges: np.ndarray,
     rig: Rig,
+    params: Params,
     speed: float,
 ) -> None:
     """State iii: the first safe direction on the chosen side, counted from the target (16), or from the border."""
@@ -367,25 +373,28 @@ def _follow(
     if decision["fused"]:
         reason = decision["reason"]
     state = FOLLOW
-    if safe_count == 0:
-        reason = R_DEAD_END
-        state = ESCAPE
-        safe_count = safe_directions(
-            masked,
-            sensor.range_min,
-            sensor.increment,
-            sensor.wraps,
-            rig.protection.r,
-            0,
-            rig.footprint,
-            edges,
-            safe,
-        )
     start = percept["goal_bearing"]
     if memory["strict"]:
         start = memory["heading"] - percept["compass"] - side * 0.6 * math.pi
         reason = R_LOOP
     heading, found = first_safe(safe, start, side, sensor.angle_min, sensor.increment, sensor.beams, sensor.wraps)
+    turn = angle_from(0.0, side * (heading - start))
+    for level in range(1, 3):
+        if found and (level == 2 or turn <= params.wide_turn):
+            break
+        count = safe_directions(
+            masked, sensor.range_min, sensor.range_max, sensor.wraps, rig.reach[level], edges, narrow
+        )
+        if count == 0:
+            continue
+        other, found_other = first_safe(
+            narrow, start, side, sensor.angle_min, sensor.increment, sensor.beams, sensor.wraps
+        )
+        if found_other and (not found or angle_from(0.0, side * (other - start)) < turn):
+            if not found:
+                reason, state = R_DEAD_END, ESCAPE
+            heading, found = other, True
+            turn = angle_from(0.0, side * (heading - start))
     if not found:
         heading = away_from_nearest(ranges, rig)
         reason = R_LOST
