@@ -14,7 +14,7 @@ import numpy as np
 from swarmscope._jit import jit, jit_inline
 from swarmscope.geometry import TWO_PI, angle_from, wrap_angle
 from swarmscope.onboard.control.guard import halt, head_for
-from swarmscope.onboard.control.unicycle import arrival_speed
+from swarmscope.onboard.control.unicycle import FULL_SPEED_WITHIN, arrival_speed
 from swarmscope.onboard.percept import PEERS, Rig, Scratch
 from swarmscope.onboard.perception.safety import beam_of, corridor_length, safe_directions
 from swarmscope.onboard.planning._contract import (
@@ -64,6 +64,12 @@ class Params(NamedTuple):
     """Longest wait for a neighbour to pass; after it the neighbour is an obstacle for the same time."""
     wide_turn: float = 1.0
     """Turn from the target [rad] beyond which narrower gaps are looked for."""
+    stuck_s: float = 20.0
+    """A following that gets no closer to the goal for so long is a loop."""
+    turn_back: float = 1.75
+    """A following turns back towards the target by at most this in one tick [rad]."""
+    resume_m: float = 0.5
+    """An obstacle met so soon after a following ended is the same one: the side stays."""
     loop_m: float = 1.0
     """A second choice of side this close to an earlier one, without progress, is a loop."""
 
@@ -73,20 +79,23 @@ MEMORY = np.dtype(
         ("mode", np.uint8),
         ("side", np.int8),
         ("strict", np.uint8),  # follows the border until closer to the goal than ever (after a loop)
-        ("flips", np.int64),
         ("heading", np.float64),  # direction of travel, compass frame [rad]
+        ("turning", np.uint8),  # turns on the spot towards it
+        ("wind", np.float64),  # how far the following has turned off the target, on its side, may exceed a circle [rad]
+        ("target", np.float64),  # direction of the target at the last tick, compass frame [rad]
+        ("travel", np.float64),  # way made so far, by odometry [m]
+        ("left_at", np.float64),  # of it when the last following ended [m]
+        ("last_side", np.int8),  # side of the last following
         ("best", np.float64),  # smallest goal distance so far [m]
         ("best_s", np.float64),  # when
         ("leave", np.float64),  # goal distance to beat before a strict following ends [m]
-        ("strict_x", np.float64),  # where the strict following began, own odometry [m]
-        ("strict_y", np.float64),
-        ("strict_away", np.uint8),
         ("wait_s", np.float64),  # when the present wait began, -1 = none
         ("push_s", np.float64),  # until when waiting is not allowed
         ("log_n", np.int64),  # choices of a side so far
         ("log_x", np.float64, LOG),
         ("log_y", np.float64, LOG),
         ("log_goal", np.float64, LOG),
+        ("log_travel", np.float64, LOG),
         ("log_side", np.int8, LOG),
     ]
 )
@@ -97,6 +106,7 @@ def new_memory(robots: int) -> np.ndarray:
     memory = np.zeros(robots, MEMORY)
     memory["wait_s"] = -1.0
     memory["best"] = np.inf
+    memory["left_at"] = -np.inf
     return memory
 
 
@@ -204,8 +214,8 @@ def decide(
         halt(decision)
         _say(decision, memory, ARRIVED, R_ARRIVED)
         return
-    if goal < memory["best"] - 0.3:
-        memory["best"], memory["best_s"] = goal, now
+    memory["travel"] += math.sqrt(percept["odom_x"] ** 2 + percept["odom_y"] ** 2)
+    _watch_progress(shared, memory, goal, now, params)
     sensor = rig.sensor
     bearing = percept["goal_bearing"]
     speed = arrival_speed(goal - 0.5 * params.arrive_m, rig.body.v_max, rig.body.a_max, percept["dt_s"])
@@ -221,6 +231,8 @@ def decide(
         beam = beam_of(bearing, sensor.angle_min, sensor.increment, sensor.beams, sensor.wraps)
         free = beam >= 0 and safe[beam] == 1
     if free and _may_leave(memory, goal):
+        if memory["mode"] == FOLLOW:
+            memory["left_at"], memory["last_side"] = memory["travel"], memory["side"]
         memory["side"] = 0
         memory["strict"] = 0
         memory["mode"] = ADVANCE
@@ -234,6 +246,19 @@ def decide(
         _follow(ranges, masked, percept, memory, decision, safe, safe_count, narrow, edges, rig, params, speed)
     _yield(percept, shared, memory, decision, rig, params)
     memory["heading"] = percept["compass"] + decision["heading"]
+
+
+@jit_inline
+def _watch_progress(shared: np.ndarray, memory: np.ndarray, goal: float, now: float, params: Params) -> None:
+    """Notice a following that gets no closer to the goal for long: follow strictly, then on the other side."""
+    if goal < memory["best"] - 0.3:
+        memory["best"], memory["best_s"] = goal, now
+    if memory["mode"] != FOLLOW or now - memory["best_s"] < params.stuck_s:
+        return
+    memory["best"], memory["best_s"] = goal, now
+    if memory["strict"]:
+        memory["side"] = -memory["side"]
+    _start_strict(shared, memory, goal)
 
 
 @jit
@@ -307,6 +332,10 @@ def _decide_side(
 ) -> bool:
     """State ii: choose the side, waiting for answers that are still out. Return whether it is chosen."""
     now = percept["now_s"]
+    if memory["travel"] - memory["left_at"] < params.resume_m:
+        memory["side"], memory["mode"], memory["wind"] = memory["last_side"], FOLLOW, 0.0
+        memory["target"] = percept["compass"] + percept["goal_bearing"]
+        return True
     if params.w_i > 0.0 and memory["mode"] != DECIDE and now - shared["asked_s"] > params.patience_s + 0.3:
         _ask_neighbours(percept, shared, decision, rig)
     memory["mode"] = DECIDE
@@ -319,7 +348,8 @@ def _decide_side(
     )
     memory["side"] = _break_loop(percept, shared, memory, params, side)
     _say(decision, memory, DECIDE, R_LOOP if memory["strict"] else (R_FUSED if decision["heard"] else R_ALONE))
-    memory["mode"] = FOLLOW
+    memory["mode"], memory["wind"] = FOLLOW, 0.0
+    memory["target"] = percept["compass"] + percept["goal_bearing"]
     return True
 
 
@@ -331,24 +361,24 @@ def _break_loop(percept: np.ndarray, shared: np.ndarray, memory: np.ndarray, par
     for k in range(known):
         j = (memory["log_n"] - 1 - k) % LOG
         d = math.sqrt((x - memory["log_x"][j]) ** 2 + (y - memory["log_y"][j]) ** 2)
+        if memory["travel"] - memory["log_travel"][j] < 2.0 * params.loop_m:
+            continue
         if d < params.loop_m and goal > memory["log_goal"][j] - 0.2:
-            _start_strict(shared, memory)
+            _start_strict(shared, memory, goal)
             side = memory["log_side"][j]
             break
     j = memory["log_n"] % LOG
     memory["log_x"][j], memory["log_y"][j], memory["log_goal"][j] = x, y, goal
-    memory["log_side"][j] = side
+    memory["log_side"][j], memory["log_travel"][j] = side, memory["travel"]
     memory["log_n"] += 1
     return side
 
 
 @jit_inline
-def _start_strict(shared: np.ndarray, memory: np.ndarray) -> None:
-    """Begin a strict following here."""
+def _start_strict(shared: np.ndarray, memory: np.ndarray, goal: float) -> None:
+    """Begin a strict following here: it ends closer to the goal than here."""
     memory["strict"] = 1
-    memory["leave"] = memory["best"] - 0.1
-    memory["strict_x"], memory["strict_y"] = shared["x"], shared["y"]
-    memory["strict_away"] = 0
+    memory["leave"] = goal - 0.1
 
 
 @jit
@@ -373,9 +403,11 @@ def _follow(
     if decision["fused"]:
         reason = decision["reason"]
     state = FOLLOW
-    start = percept["goal_bearing"]
+    target = percept["compass"] + percept["goal_bearing"]
+    wind = memory["wind"] - side * wrap_angle(target - memory["target"])
+    back = max(0.0, wind - params.turn_back)
+    start = percept["goal_bearing"] + side * back
     if memory["strict"]:
-        start = memory["heading"] - percept["compass"] - side * 0.6 * math.pi
         reason = R_LOOP
     heading, found = first_safe(safe, start, side, sensor.angle_min, sensor.increment, sensor.beams, sensor.wraps)
     turn = angle_from(0.0, side * (heading - start))
@@ -398,8 +430,36 @@ def _follow(
     if not found:
         heading = away_from_nearest(ranges, rig)
         reason = R_LOST
-    head_for(decision, percept, heading, speed if memory["strict"] == 0 else rig.body.v_max, rig)
+    else:
+        memory["wind"], memory["target"] = back + turn, target
+    heading = _keep_turning(masked, percept, memory, heading, narrow, edges, rig)
+    head_for(decision, percept, heading, speed, rig)
     decision["state"], decision["reason"], decision["side"] = state, reason, side
+
+
+@jit_inline
+def _keep_turning(
+    masked: np.ndarray,
+    percept: np.ndarray,
+    memory: np.ndarray,
+    heading: float,
+    narrow: np.ndarray,
+    edges: np.ndarray,
+    rig: Rig,
+) -> float:
+    """Return the heading to take: a turn on the spot is finished before another begins, if its end is still free.
+
+    Without this, two directions that take turns at being the best would keep a robot swinging for ever.
+    """
+    sensor = rig.sensor
+    before = wrap_angle(memory["heading"] - percept["compass"])
+    if memory["turning"] and abs(before) > FULL_SPEED_WITHIN:
+        safe_directions(masked, sensor.range_min, sensor.range_max, sensor.wraps, rig.reach[2], edges, narrow)
+        n = beam_of(before, sensor.angle_min, sensor.increment, sensor.beams, sensor.wraps)
+        if n >= 0 and narrow[n]:
+            return before
+    memory["turning"] = abs(wrap_angle(heading)) > FULL_SPEED_WITHIN
+    return heading
 
 
 @jit
