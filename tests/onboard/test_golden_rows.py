@@ -64,7 +64,7 @@ def test_own_probability_of_r3():
     features = table("R3")
     h, q = ALPHA_HALF, math.pi / 2
     areas = [quadrant_area(*features, *span, True) for span in ((0, h), (-h, 0), (h, q), (-q, -h))]
-    assert left_probability(*areas) == pytest.approx(0.5042, abs=5e-5)
+    assert left_probability(*areas, 0.0) == pytest.approx(0.5042, abs=5e-5)
 
 
 def test_following_probability_of_r2():

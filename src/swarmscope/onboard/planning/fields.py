@@ -30,9 +30,9 @@ def in_pass_band(distance: float, sigma_a: float) -> bool:
 
 
 @jit
-def left_probability(area_1: float, area_2: float, area_3: float, area_4: float) -> float:
-    """Return P_a (Nav-SCOPE 9, SFM-MAS 7 and 8 with w_s = 1) from the open areas of quadrants I to IV."""
-    return sigmoid(0.5 * (area_1 - area_2 + area_3 - area_4))
+def left_probability(area_1: float, area_2: float, area_3: float, area_4: float, bias: float) -> float:
+    """Return P_a (Nav-SCOPE 9, SFM-MAS 7 and 8 with w_s = 1) from the open areas of quadrants I to IV and b_0."""
+    return sigmoid(0.5 * (area_1 - area_2 + area_3 - area_4) + bias)
 
 
 @jit

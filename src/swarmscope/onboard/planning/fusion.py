@@ -21,7 +21,7 @@ from swarmscope.onboard.planning.fields import (
 
 
 @jit
-def own_probability(angles: np.ndarray, distances: np.ndarray, count: int, half_alpha: float) -> float:
+def own_probability(angles: np.ndarray, distances: np.ndarray, count: int, half_alpha: float, bias: float) -> float:
     """Return P_a (9) from our features in the target-aligned frame, sorted in [0, 2 pi), normalised distances."""
     quarter = 0.5 * math.pi
     return left_probability(
@@ -29,6 +29,7 @@ def own_probability(angles: np.ndarray, distances: np.ndarray, count: int, half_
         quadrant_area(angles, distances, count, -half_alpha, 0.0, False),
         quadrant_area(angles, distances, count, half_alpha, quarter, False),
         quadrant_area(angles, distances, count, -quarter, -half_alpha, False),
+        bias,
     )
 
 
@@ -39,6 +40,7 @@ def choose_side(
     decision: np.ndarray,
     rig: Rig,
     w_i: float,
+    bias: float,
     angles: np.ndarray,
     distances: np.ndarray,
     count: int,
@@ -54,7 +56,7 @@ def choose_side(
     range_max = rig.sensor.range_max
     align_features(angles, distances, count, -target, out_angles, out_distances)
     _normalise_all(out_distances, count, range_max)
-    p_self = own_probability(out_angles, out_distances, count, half_alpha)
+    p_self = own_probability(out_angles, out_distances, count, half_alpha, bias)
     threshold = normalise(rig.protection.w_n, range_max)
     weighted, weights = 0.0, 0.0
     heard = 0

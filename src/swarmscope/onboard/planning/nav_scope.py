@@ -52,6 +52,8 @@ class Params(NamedTuple):
 
     w_i: float = 1.0
     """Weight of the neighbours (12); 0 is Nav-I."""
+    prior: float = 0.0
+    """Weight of the turn in sight [1/rad] in the bias b_0 of (9); 0 as printed."""
     ask_ahead_s: float = 0.6
     """Features are asked for this long before the obstacle is at the planning distance."""
     patience_s: float = 0.6
@@ -241,7 +243,7 @@ def decide(
         _request_ahead(masked, percept, shared, decision, rig, params)
     else:
         if memory["mode"] != FOLLOW:
-            if not _decide_side(percept, shared, memory, decision, rig, params, features, distances, count):
+            if not _decide_side(percept, shared, memory, decision, rig, params, safe, features, distances, count):
                 return
         _follow(ranges, masked, percept, memory, decision, safe, safe_count, narrow, edges, rig, params, speed)
     _yield(percept, shared, memory, decision, rig, params)
@@ -326,6 +328,7 @@ def _decide_side(
     decision: np.ndarray,
     rig: Rig,
     params: Params,
+    safe: np.ndarray,
     features: np.ndarray,
     distances: np.ndarray,
     count: int,
@@ -343,8 +346,9 @@ def _decide_side(
         halt(decision)
         _say(decision, memory, DECIDE, R_ANSWERS)
         return False
+    bias = params.prior * (turn_to_safe(percept, safe, -1, rig) - turn_to_safe(percept, safe, 1, rig))
     side = choose_side(
-        percept, shared, decision, rig, params.w_i, features[0], distances[0], max(0, count), features[1], distances[1]
+        percept, shared, decision, rig, params.w_i, bias, features[0], distances[0], max(0, count), features[1], distances[1]
     )
     memory["side"] = _break_loop(percept, shared, memory, params, side)
     _say(decision, memory, DECIDE, R_LOOP if memory["strict"] else (R_FUSED if decision["heard"] else R_ALONE))
@@ -479,6 +483,18 @@ def first_safe(
         if n < beams and safe[n] == 1:
             return wrap_angle(angle_min + n * increment), True
     return 0.0, False
+
+
+@jit_inline
+def turn_to_safe(percept: np.ndarray, safe: np.ndarray, side: int, rig: Rig) -> float:
+    """Return the turn [rad] from the target to the first safe direction on ``side``, pi when there is none."""
+    sensor = rig.sensor
+    heading, found = first_safe(
+        safe, percept["goal_bearing"], side, sensor.angle_min, sensor.increment, sensor.beams, sensor.wraps
+    )
+    if not found:
+        return math.pi
+    return angle_from(0.0, side * (heading - percept["goal_bearing"]))
 
 
 @jit
