@@ -20,7 +20,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swarmscope._jit import jit, jit_inline
+from swarmscope._jit import jit_alloc as jit
+from swarmscope._jit import jit_inline
 from swarmscope.geometry import angle_from, point_segment_distance
 from swarmscope.sim.contact import static_clearance
 from swarmscope.sim.world import World, WorldSpec, compile_world
@@ -33,6 +34,7 @@ SNAP_CELLS = 3  # a start or goal in a blocked cell is taken to the nearest free
 MOST_DISCS = 400  # of one tangent graph; more take the pulled way
 MOST_POINTS = 500  # of a way that is pulled taut; longer ones are thinned
 TOUCH_M = 1e-9  # a tangent may touch, rounding must not block it
+PIECE_M = 1.5  # a line of sight is looked at in pieces of this length
 ARC_STEP_RAD = 0.05  # between the points that draw an arc
 
 Floats = NDArray[np.float64]
@@ -191,6 +193,19 @@ def _beyond_ends(length: float, apart: float) -> float:
 
 
 @jit
+def _sees(world: World, ax: float, ay: float, bx: float, by: float, radius: float) -> bool:
+    """Say whether the line a-b keeps ``radius`` off everything; asked in pieces, so that a near wall ends it
+    soon."""
+    pieces = max(1, math.ceil(math.sqrt((bx - ax) * (bx - ax) + (by - ay) * (by - ay)) / PIECE_M))
+    ux, uy = (bx - ax) / pieces, (by - ay) / pieces
+    for k in range(pieces):
+        x, y = ax + k * ux, ay + k * uy
+        if static_clearance(world, x, y, x + ux, y + uy, radius + 1.0e-3) < radius:
+            return False
+    return True
+
+
+@jit
 def _pull(world: World, points: Floats, along: Floats, radius: float) -> Ints:
     """Return of each point the one before it on the shortest chain of visible points; steps along the way
     are free."""
@@ -205,7 +220,7 @@ def _pull(world: World, points: Floats, along: Floats, radius: float) -> Ints:
         for other in range(k + 2, count):
             ax, ay, bx, by = points[k, 0], points[k, 1], points[other, 0], points[other, 1]
             through = cost[k] + math.sqrt((bx - ax) * (bx - ax) + (by - ay) * (by - ay))
-            if through < cost[other] and static_clearance(world, ax, ay, bx, by, radius + 1.0e-3) >= radius:
+            if through < cost[other] and _sees(world, ax, ay, bx, by, radius):
                 cost[other], before[other] = through, k
     return before
 
