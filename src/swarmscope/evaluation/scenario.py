@@ -84,12 +84,12 @@ class GuardModel(_Strict):
 
 
 class SafetyModel(_Strict):
-    """Which directions count as safe."""
+    """Which directions count as safe (docs/theory.md); ``sector: true, look_ahead_m: 0`` is the printed rule alone."""
 
-    sector: bool = True
-    look_ahead_m: NotNegative = 0.0
-    margin_m: NotNegative = 0.0
-    narrow_m: NotNegative = 0.0
+    sector: bool = False
+    look_ahead_m: NotNegative = 2.0
+    margin_m: NotNegative = 0.04
+    narrow_m: NotNegative = 1.2
 
 
 class TaskModel(_Strict):
@@ -207,14 +207,14 @@ def make_setup(scenario: Scenario) -> Setup:
         task = load_task(scenario.task.name)
         return task.make(scenario.seed, scenario.robots, radius, **scenario.task.options)
     if scenario.map is not None:
-        from swarmscope.tasks._check import place_on_map
+        from swarmscope.tasks import place_on_map
 
         spec = map_world(Path(scenario.map.file))
         return place_on_map(spec, scenario.seed, scenario.robots, radius, scenario.map.min_distance_m)
     place = scenario.place
     if place is None or len(place.starts) != scenario.robots or len(place.goals) != scenario.robots:
         raise ConfigError("place", f"needs as many starts and goals as robots ({scenario.robots})")
-    from swarmscope.tasks._check import check_setup
+    from swarmscope.tasks import check_setup
 
     setup = Setup(place.world, np.array(place.starts, float), np.array(place.goals, float))
     check_setup(setup, radius)

@@ -146,6 +146,8 @@ class Rig(NamedTuple):
     """Features older than this are not used [s]."""
     exact_features: bool
     """Send float32 features instead of quantised ones (to measure what quantisation costs)."""
+    look_ahead: float
+    """Directions are free of obstacles up to here [m]."""
     reach: np.ndarray
     """(3, BINS) int16: what a return blocks, for the safe directions, the narrow gaps and the escape."""
     cos: np.ndarray
@@ -186,12 +188,16 @@ def make_rig(
     persistence: float = 2.0,
     max_feature_age: float = 1.5,
     exact_features: bool = False,
-    sector: bool = True,
-    look_ahead: float = 0.0,
-    margin: float = 0.0,
-    narrow: float = 0.0,
+    sector: bool = False,
+    look_ahead: float = 2.0,
+    margin: float = 0.04,
+    narrow: float = 1.2,
 ) -> Rig:
-    """Return the constants of a robot with ``body`` and ``sensor``; raises ConfigError for an impossible body."""
+    """Return the constants of a robot with ``body`` and ``sensor``; raises ConfigError for an impossible body.
+
+    ``sector`` uses the printed rule (3) within l_th; ``look_ahead`` [m] is how far ahead directions must keep
+    ``margin`` [m] from everything, ``narrow`` [m] how far ahead a gap must be free that the body just fits.
+    """
     protection = protection_model(body)
     half = window_half(protection.alpha, sensor.increment)
     angles = sensor.angle_min + sensor.increment * np.arange(sensor.beams)
@@ -204,6 +210,7 @@ def make_rig(
     )
     reach = np.stack([reach_table(sensor.increment, sensor.range_max, footprint, *rule) for rule in rules])
     return Rig(
+        look_ahead=look_ahead,
         reach=reach,
         body=Body(*(float(v) for v in body)),
         protection=protection,

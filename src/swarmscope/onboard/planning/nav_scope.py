@@ -52,15 +52,17 @@ class Params(NamedTuple):
 
     w_i: float = 1.0
     """Weight of the neighbours (12); 0 is Nav-I."""
-    prior: float = 0.0
+    prior: float = 3.0
     """Weight of the turn in sight [1/rad] in the bias b_0 of (9); 0 as printed."""
-    ask_ahead_s: float = 0.6
-    """Features are asked for this long before the obstacle is at the planning distance."""
+    ask_ahead_s: float = 0.8
+    """Features are asked for this long before the obstacle comes within the horizon."""
+    ask_every_s: float = 1.0
+    """Shortest time between two rounds of requests; an answer takes two ticks and twice the radio's latency."""
     patience_s: float = 0.6
     """How long a decision waits for answers that are still out."""
     arrive_m: float = 0.05
     """Distance to the goal at which a robot has arrived."""
-    still_s: float = 1.2
+    still_s: float = 0.6
     """A neighbour that has not moved for so long is an obstacle."""
     wait_s: float = 2.0
     """Longest wait for a neighbour to pass; after it the neighbour is an obstacle for the same time."""
@@ -293,16 +295,18 @@ def _request_ahead(
 ) -> None:
     """Ask the neighbours in the pass band for features when an obstacle nears the planning distance."""
     now = percept["now_s"]
-    if params.w_i <= 0.0 or now - shared["asked_s"] < params.ask_ahead_s:
+    if params.w_i <= 0.0 or now - shared["asked_s"] < params.ask_every_s:
         return
     sensor = rig.sensor
-    horizon = rig.protection.l_th + params.ask_ahead_s * rig.body.v_max
+    horizon = max(rig.protection.l_th, rig.look_ahead) + params.ask_ahead_s * rig.body.v_max
     if percept["goal_distance"] <= horizon:
         return
     centre = beam_of(percept["goal_bearing"], sensor.angle_min, sensor.increment, sensor.beams, sensor.wraps)
     for k in range(-rig.half, rig.half + 1):
         n = (centre + k) % sensor.beams if sensor.wraps else centre + k
-        if 0 <= n < sensor.beams and masked[n] < horizon:
+        if 0 <= n < sensor.beams and masked[n] < horizon and masked[n] * abs(
+            math.sin(k * sensor.increment)
+        ) < rig.footprint:
             _ask_neighbours(percept, shared, decision, rig)
             return
 
@@ -339,7 +343,7 @@ def _decide_side(
         memory["side"], memory["mode"], memory["wind"] = memory["last_side"], FOLLOW, 0.0
         memory["target"] = percept["compass"] + percept["goal_bearing"]
         return True
-    if params.w_i > 0.0 and memory["mode"] != DECIDE and now - shared["asked_s"] > params.patience_s + 0.3:
+    if params.w_i > 0.0 and memory["mode"] != DECIDE and now - shared["asked_s"] >= params.ask_every_s:
         _ask_neighbours(percept, shared, decision, rig)
     memory["mode"] = DECIDE
     if waiting_for_answers(percept, shared, params.patience_s):
