@@ -15,7 +15,8 @@ class UnknownNameError(SwarmscopeError):
 
     def __init__(self, kind: str, name: str, valid: Iterable[str], where: str = "") -> None:
         self.kind, self.name, self.valid, self.where = kind, name, sorted(valid), where
-        super().__init__(f"{where + ': ' if where else ''}unknown {kind} '{name}'{nearest_hint(name, self.valid)}")
+        place = f"{where}: " if where else ""
+        super().__init__(f"{place}unknown {kind} '{name}'{nearest_hint(name, self.valid)}")
 
 
 class ConfigError(SwarmscopeError):

@@ -1,4 +1,4 @@
-"""Angles and plane geometry: scalars in, scalars out, radians and metres, REP-103 (x forward, y left, CCW)."""
+"""Angles and plane geometry: scalars in, scalars out, radians, metres, REP-103 (x forward, y left, CCW)."""
 
 from __future__ import annotations
 
@@ -19,10 +19,22 @@ def wrap_angle(angle: float) -> float:
 
 
 @jit_inline
+def positive_angle(angle: float) -> float:
+    """Return ``angle`` [rad] wrapped to [0, 2 pi); fast when it is within a turn of that."""
+    if angle < 0.0:
+        angle += TWO_PI
+    elif angle >= TWO_PI:
+        angle -= TWO_PI
+    if 0.0 <= angle < TWO_PI:
+        return angle
+    angle -= TWO_PI * math.floor(angle / TWO_PI)
+    return angle if angle < TWO_PI else 0.0
+
+
+@jit_inline
 def angle_from(start: float, angle: float) -> float:
     """Return how far one turns counter-clockwise from ``start`` to ``angle`` [rad], in [0, 2 pi)."""
-    turn = (angle - start) - TWO_PI * math.floor((angle - start) / TWO_PI)
-    return turn if turn < TWO_PI else 0.0
+    return positive_angle(angle - start)
 
 
 @jit_inline
@@ -56,7 +68,7 @@ def ray_circle(dx: float, dy: float, cx: float, cy: float, radius: float) -> flo
 
 @jit_inline
 def ray_segment(dx: float, dy: float, ax: float, ay: float, bx: float, by: float) -> float:
-    """Return the range [m] along unit direction d at which a ray from the origin meets segment a-b, else inf."""
+    """Return the range [m] along unit direction d at which a ray from the origin meets segment a-b, or inf."""
     ux, uy = bx - ax, by - ay
     denominator = dx * uy - dy * ux
     if denominator == 0.0:
@@ -77,7 +89,8 @@ def segments_distance(
     o4 = (dx - cx) * (by - cy) - (dy - cy) * (bx - cx)
     if o1 * o2 < 0.0 and o3 * o4 < 0.0:
         return 0.0
-    return min(
-        min(point_segment_distance(ax, ay, cx, cy, dx, dy), point_segment_distance(bx, by, cx, cy, dx, dy)),
-        min(point_segment_distance(cx, cy, ax, ay, bx, by), point_segment_distance(dx, dy, ax, ay, bx, by)),
-    )
+    ab_c = point_segment_distance(cx, cy, ax, ay, bx, by)
+    ab_d = point_segment_distance(dx, dy, ax, ay, bx, by)
+    cd_a = point_segment_distance(ax, ay, cx, cy, dx, dy)
+    cd_b = point_segment_distance(bx, by, cx, cy, dx, dy)
+    return min(ab_c, ab_d, cd_a, cd_b)

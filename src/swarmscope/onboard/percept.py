@@ -16,11 +16,11 @@ from swarmscope.onboard.perception.safety import reach_table
 from swarmscope.onboard.robot import Body, Protection, protection_model
 from swarmscope.onboard.sharing.message import MAX_FEATURES, MAX_PACKET_BYTES
 
-MAX_NEIGHBOURS = 16
+MAX_NEIGHBOURS = 10
 """Neighbours that mutual positioning reports in one tick, nearest first."""
-MAX_INBOX = 12
+MAX_INBOX = 8
 """Packets handed over in one tick; more wait for the next."""
-MAX_OUTBOX = 12
+MAX_OUTBOX = 8
 """Packets a robot may send in one tick."""
 
 PERCEPT = np.dtype(
@@ -65,7 +65,7 @@ DECISION = np.dtype(
     ]
 )
 
-PEERS = 12
+PEERS = 10
 """Neighbours that are remembered at once."""
 
 SHARED = np.dtype(
@@ -149,7 +149,7 @@ class Rig(NamedTuple):
     look_ahead: float
     """Directions are free of obstacles up to here [m]."""
     reach: np.ndarray
-    """(3, BINS) int16: what a return blocks, for the safe directions, the narrow gaps and the escape."""
+    """(3, BINS + 1) int16: what a return blocks, for the safe directions, the narrow gaps and the escape."""
     cos: np.ndarray
     sin: np.ndarray
     taps: np.ndarray

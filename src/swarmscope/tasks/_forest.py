@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from swarmscope._jit import jit
+from swarmscope._jit import jit_alloc as jit
 from swarmscope.errors import ConfigError, UnsolvableWorldError
 from swarmscope.sim.world import Circle, WorldSpec
 from swarmscope.tasks._check import Reach, unreachable

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swarmscope._jit import jit
+from swarmscope._jit import jit_alloc as jit
 from swarmscope.geometry import point_segment_distance
 from swarmscope.sim.world import World, WorldSpec
 

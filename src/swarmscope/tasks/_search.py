@@ -14,7 +14,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from swarmscope._jit import jit
+from swarmscope._jit import jit_alloc as jit
 from swarmscope.tasks._occupancy import Raster
 
 SQRT2 = math.sqrt(2.0)

@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from swarmscope._jit import jit, jit_inline
-from swarmscope.geometry import TWO_PI, angle_from
+from swarmscope.geometry import angle_from, positive_angle
 from swarmscope.onboard.perception.features import reconstruct
 
 
@@ -41,7 +41,7 @@ def quadrant_area(
 
     Features sorted in [0, 2 pi), distances normalised. ``triangles`` chooses (SFM-MAS 24) over (Nav-SCOPE 22).
     """
-    start = lower - TWO_PI * math.floor(lower / TWO_PI)
+    start = positive_angle(lower)
     width = upper - lower
     area = 0.0
     at = 0.0
@@ -62,7 +62,7 @@ def quadrant_area(
             area += sector_area(there - at, d_at, distances[j])
         at, d_at = there, distances[j]
     end = start + width
-    d_end = reconstruct(angles, distances, count, end - TWO_PI * math.floor(end / TWO_PI), False)
+    d_end = reconstruct(angles, distances, count, positive_angle(end), False)
     if triangles:
         return area + triangle_area(width - at, d_at, d_end)
     return area + sector_area(width - at, d_at, d_end)
@@ -78,9 +78,9 @@ def passable_distance(
     the smallest minimum. Features sorted in [0, 2 pi), distances normalised. Boundary values linear in the
     angle, or on the polygon's ``chords`` (readings 8: Table II's R2 needs the former, R4 the latter).
     """
-    start = lower - TWO_PI * math.floor(lower / TWO_PI)
+    start = positive_angle(lower)
     width = upper - lower
-    end = (start + width) - TWO_PI * math.floor((start + width) / TWO_PI)
+    end = positive_angle(start + width)
     largest = max(
         reconstruct(angles, distances, count, start, chords), reconstruct(angles, distances, count, end, chords)
     )

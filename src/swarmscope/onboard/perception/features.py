@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from swarmscope._jit import jit, jit_inline
-from swarmscope.geometry import TWO_PI
+from swarmscope.geometry import TWO_PI, positive_angle
 
 FLAT = 1e-5
 """Change from beam to beam, as a fraction of the range, below which the filtered scan counts as flat."""
@@ -30,7 +30,7 @@ def extrema(
     directions that are not safe are left out (gaps too narrow for the robot). Ascending angles, sensor frame.
     """
     beams = filtered.size
-    flat = FLAT * range_max
+    flat = np.float32(FLAT * range_max)
     start = 0
     steps = beams if wraps else beams - 1
     if wraps:  # begin just after a slope, so that no plateau is cut in two
@@ -39,23 +39,25 @@ def extrema(
         if start == beams:
             return 0
     rising = 0
-    last_slope = start
+    slope_at = start  # beam and step number of the last change
+    slope_step = 0
     count = 0
+    n = start
     for k in range(steps + (1 if wraps else 0)):
-        n = (start + k) % beams
-        change = filtered[(n + 1) % beams] - filtered[n]
-        if abs(change) <= flat:
-            continue
-        sign = 1 if change > 0.0 else -1
-        if rising != 0 and sign != rising:
-            top = last_slope + 1 + (start + k - last_slope - 1) // 2
-            beam = top % beams
-            if safe[beam] and count < angles.size:
-                angles[count] = angle_min + beam * increment
-                distances[count] = filtered[beam]
-                count += 1
-        rising = sign
-        last_slope = start + k
+        after = n + 1 if n + 1 < beams else 0
+        change = filtered[after] - filtered[n]
+        if change > flat or change < -flat:
+            sign = 1 if change > flat else -1
+            if rising != 0 and sign != rising:
+                beam = slope_at + 1 + (k - slope_step - 1) // 2
+                if beam >= beams:
+                    beam -= beams
+                if safe[beam] and count < angles.size:
+                    angles[count] = angle_min + beam * increment
+                    distances[count] = filtered[beam]
+                    count += 1
+            rising, slope_at, slope_step = sign, n, k
+        n = after
     _sort_by_angle(angles, distances, count)
     return count
 
@@ -74,13 +76,28 @@ def _sort_by_angle(angles: np.ndarray, distances: np.ndarray, count: int) -> Non
 
 @jit
 def align_features(
-    angles: np.ndarray, distances: np.ndarray, count: int, turn: float, out_angles: np.ndarray, out_distances: np.ndarray
+    angles: np.ndarray,
+    distances: np.ndarray,
+    count: int,
+    turn: float,
+    out_angles: np.ndarray,
+    out_distances: np.ndarray,
 ) -> None:
-    """Write the features turned by ``turn`` [rad] into the out arrays: angles in [0, 2 pi), ascending."""
-    for j in range(count):
-        angle = angles[j] + turn
-        out_angles[j] = angle - TWO_PI * math.floor(angle / TWO_PI)
-        out_distances[j] = distances[j]
+    """Write the features turned by ``turn`` [rad] into the out arrays: angles in [0, 2 pi), ascending.
+
+    Features that come in ascending order stay in it but for where the circle ends, which saves the sorting.
+    """
+    turn = positive_angle(turn)
+    first = 0  # the feature with the smallest angle after turning
+    while first < count and angles[first] + turn < TWO_PI:
+        first += 1
+    j = first
+    for k in range(count):
+        if j == count:
+            j = 0
+        out_angles[k] = positive_angle(angles[j] + turn)
+        out_distances[k] = distances[j]
+        j += 1
     _sort_by_angle(out_angles, out_distances, count)
 
 

@@ -66,10 +66,29 @@ def filter_padded(padded: np.ndarray, taps: np.ndarray, range_max: float, out: n
     """Write y_2 (6) [m] into ``out (M,)``: ``range_max`` minus the filtered deviation. Symmetric ``taps``."""
     beams = out.size
     half = taps.size // 2
+    limit = np.float32(range_max)
     centre = taps[half]
+    middle = padded[half : half + beams]
     for n in range(beams):
-        out[n] = np.float32(range_max) - centre * padded[half + n]
-    for k in range(1, half + 1):
-        tap = taps[half + k]
+        out[n] = limit - centre * middle[n]
+    k = 1
+    while k + 4 <= half:  # five taps a pass: the loop is bound by loads and stores
+        t0, t1, t2, t3, t4 = taps[half + k], taps[half + k + 1], taps[half + k + 2], taps[half + k + 3], taps[half + k + 4]
+        low = padded[half - k - 4 : half - k + beams]
+        high = padded[half + k : half + k + 4 + beams]
         for n in range(beams):
-            out[n] -= tap * (padded[half + n - k] + padded[half + n + k])
+            out[n] -= (
+                t0 * (low[n + 4] + high[n])
+                + t1 * (low[n + 3] + high[n + 1])
+                + t2 * (low[n + 2] + high[n + 2])
+                + t3 * (low[n + 1] + high[n + 3])
+                + t4 * (low[n] + high[n + 4])
+            )
+        k += 5
+    while k <= half:
+        tap = taps[half + k]
+        low = padded[half - k : half - k + beams]
+        high = padded[half + k : half + k + beams]
+        for n in range(beams):
+            out[n] -= tap * (low[n] + high[n])
+        k += 1

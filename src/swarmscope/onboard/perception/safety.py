@@ -11,6 +11,10 @@ from swarmscope._jit import jit, jit_inline
 
 BINS = 512
 """Entries of a reach table over [0, range_max): 1 cm each at 5 m."""
+BORDER = BINS + 1
+"""Entry of a reach table for the ends of a limited field of view."""
+UNSEEN_HALF_ANGLE = math.pi / 6.0
+"""What lies just outside a limited field of view counts as a return two footprints away: asin(1/2) to either side."""
 
 
 def blocking_half_angle(
@@ -40,14 +44,20 @@ def reach_table(
     look_ahead: float,
     margin: float,
 ) -> np.ndarray:
-    """Return, for each range bin, how many beams to either side a return blocks; -1 = none. (BINS,) int16.
+    """Return, for each range bin, how many beams to either side a return blocks; -1 = none. (BINS + 2,) int16.
 
-    Rounded to the safe side: a bin blocks what the nearest range in it blocks.
+    Rounded to the safe side: a bin blocks what the nearest range in it blocks. Entry ``BINS`` is the number of
+    the first bin that blocks nothing any more, entry ``BORDER`` how many beams at either end of a limited field
+    of view are not safe, because nobody has seen what is beside them.
     """
-    table = np.empty(BINS, np.int16)
+    table = np.empty(BINS + 2, np.int16)
+    table[BINS] = 0
+    table[BORDER] = math.ceil(max(half_alpha, UNSEEN_HALF_ANGLE) / increment - 1e-6)
     for k in range(BINS):
         half = blocking_half_angle(k * range_max / BINS, footprint, l_th, half_alpha, look_ahead, margin)
         table[k] = math.ceil(half / increment - 1e-6) if half > 0.0 else -1
+        if half > 0.0:
+            table[BINS] = k + 1
     return table
 
 
@@ -57,19 +67,23 @@ def safe_directions(
 ) -> int:
     """Write 1 into ``safe (M,)`` for each beam direction that is safe, else 0; return how many are.
 
-    ``reach (BINS,)`` comes from ``reach_table``; ``edges (M + 1,)`` is scratch. With the sector rule alone this
+    ``reach (BINS + 2,)`` comes from ``reach_table``; ``edges (M + 1,)`` is scratch. With the sector rule alone this
     is (5), y_1 >= l_th on the scan truncated to l_th. Invalid beams count as range 0. With a limited
-    field of view a direction whose alpha/2 window leaves it is not safe (``range 0`` reaches a quarter turn).
+    field of view a direction whose window of ``reach[BORDER]`` beams leaves it is not safe.
     """
     beams = ranges.size
     for n in range(beams + 1):
         edges[n] = 0
-    scale = BINS / range_max
+    if not wraps:
+        _block(edges, beams, wraps, -1, reach[BORDER] - 1)
+        _block(edges, beams, wraps, beams - reach[BORDER], beams)
+    scale = np.float32(BINS / range_max)
+    far = np.float32(reach[BINS] * range_max / BINS)
     for n in range(beams):
         s = ranges[n]
-        if s >= range_max:
+        if s >= far:
             continue
-        k = reach[int(s * scale)] if s >= range_min else reach[0]
+        k = reach[min(BINS - 1, int(s * scale))] if s >= range_min else reach[0]
         if k >= 0:
             _block(edges, beams, wraps, n - k, n + k)
     depth = 0

@@ -478,14 +478,16 @@ def first_safe(
 
     (Nav-SCOPE 16): the safe direction closest to the target on the chosen side.
     """
-    first = int(math.floor((start - angle_min) / increment + 0.5))
-    turns = beams if wraps else int(TWO_PI / increment)
-    for k in range(turns):
-        n = first + side * k
-        if wraps or n < 0 or n >= beams:
-            n = n % (beams if wraps else turns)
+    circle = beams if wraps else int(TWO_PI / increment)
+    n = int(math.floor((start - angle_min) / increment + 0.5)) % circle
+    for _ in range(circle):
         if n < beams and safe[n] == 1:
             return wrap_angle(angle_min + n * increment), True
+        n += side
+        if n == circle:
+            n = 0
+        elif n < 0:
+            n = circle - 1
     return 0.0, False
 
 

@@ -147,7 +147,11 @@ def mask_moving_neighbours(
         if 2 * spread + 1 > sensor.beams:
             spread = (sensor.beams - 1) // 2
         for k in range(centre - spread, centre + spread + 1):
-            n = k % sensor.beams if sensor.wraps else k
+            n = k
+            if sensor.wraps and k < 0:
+                n = k + sensor.beams
+            elif sensor.wraps and k >= sensor.beams:
+                n = k - sensor.beams
             if n < 0 or n >= sensor.beams or not ranges[n] >= sensor.range_min:
                 continue
             ex, ey = ranges[n] * rig.cos[n] - x, ranges[n] * rig.sin[n] - y
