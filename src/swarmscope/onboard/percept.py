@@ -205,7 +205,7 @@ def make_rig(
     half_alpha = 0.5 * protection.alpha if sector else 0.0
     rules = (
         (protection.l_th, half_alpha, look_ahead, body.radius + margin),
-        (narrow, 0.0, 0.0, 0.0),
+        (narrow or protection.r, 0.0, 0.0, 0.0),
         (protection.r, 0.0, 0.0, 0.0),
     )
     reach = np.stack([reach_table(sensor.increment, sensor.range_max, footprint, *rule) for rule in rules])
