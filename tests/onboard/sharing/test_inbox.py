@@ -1,0 +1,277 @@
+"""What becomes of packets: good ones are used, all others are dropped and counted; no table overflows."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from helpers import Rows, rig_of
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from swarmscope.onboard.percept import MAX_INBOX, MAX_OUTBOX, PEERS
+from swarmscope.onboard.sharing.inbox import (
+    answer_all,
+    ask,
+    read_inbox,
+    start_round,
+    waiting_for_answers,
+)
+from swarmscope.onboard.sharing.message import (
+    KIND_EXACT_FEATURES,
+    KIND_FEATURES,
+    KIND_REQUEST,
+    MAX_FEATURES,
+    MAX_PACKET_BYTES,
+    OK,
+    FeatureMessage,
+    decode,
+    encode_request,
+)
+
+RANGE_MAX = 5.0
+ANGLES, DISTANCES = (0.5, 2.0, 4.0), (1.0, 2.0, 3.0)
+
+
+def request(sender, seq):
+    out = np.zeros(MAX_PACKET_BYTES, np.uint8)
+    return out[: encode_request(sender, seq, out)].tobytes()
+
+
+def features(sender, seq, reply_to):
+    return FeatureMessage(sender, seq, reply_to, ANGLES, DISTANCES).pack(RANGE_MAX)
+
+
+def rows_of(now=10.0, **options):
+    rows = Rows(rig_of(**options))
+    rows.percepts["now_s"] = now
+    rows.percepts["id"] = 1
+    return rows
+
+
+def read(rows, *packets):
+    rows.receive(*packets)
+    read_inbox(
+        rows.percept, rows.memory, rows.rig, rows.scratch.header[0], rows.scratch.angles[0, 1], rows.scratch.distances[0, 1]
+    )
+    return rows.shared[0]
+
+
+def dropped(row):
+    return int(row["dropped_bad"]), int(row["dropped_stale"])
+
+
+def asked(rows, *peers):
+    start_round(rows.percept, rows.memory)
+    for peer in peers:
+        ask(rows.percept, rows.memory, rows.decision, peer)
+    return int(rows.shared["asked_seq"][0])
+
+
+def sent(rows):
+    """The outbox as [(to, bytes)]."""
+    row = rows.decisions[0]
+    return [(int(row["out_to"][k]), row["out"][k, : row["out_length"][k]].tobytes()) for k in range(row["n_out"])]
+
+
+def header_of(packet):
+    header = np.zeros(5, np.int64)
+    assert decode(np.frombuffer(packet, np.uint8).copy(), len(packet), header) == OK
+    return header.tolist()
+
+
+def test_a_good_answer_is_remembered():
+    rows = rows_of()
+    seq = asked(rows, 5)
+    row = read(rows, features(5, 40, seq))
+    assert dropped(row) == (0, 0)
+    slot = int(np.flatnonzero(row["heard_id"] == 5)[0])
+    assert row["heard_n"][slot] == 3
+    assert row["heard_angle"][slot, :3] == pytest.approx(ANGLES, abs=0.02)
+    assert row["heard_distance"][slot, :3] == pytest.approx(DISTANCES, abs=0.02)
+    assert row["answers_n"] == 1
+
+
+def test_requests_wait_to_be_answered_for_this_tick_only():
+    rows = rows_of()
+    row = read(rows, request(5, 1), request(6, 9))
+    assert row["ask_id"][: row["ask_n"]].tolist() == [5, 6]
+    assert row["ask_seq"][: row["ask_n"]].tolist() == [1, 9]
+    assert read(rows)["ask_n"] == 0
+
+
+@pytest.mark.parametrize("exact", [False, True])
+def test_answers_carry_the_askers_sequence_number(exact):
+    rows = rows_of(exact_features=exact)
+    read(rows, request(5, 31), request(6, 777))
+    angles, distances = np.array(ANGLES), np.array(DISTANCES)
+    answer_all(rows.percept, rows.memory, rows.decision, rows.rig, angles, distances, 3)
+    out = sent(rows)
+    assert [to for to, _ in out] == [5, 6]
+    kind = KIND_EXACT_FEATURES if exact else KIND_FEATURES
+    headers = [header_of(packet) for _, packet in out]
+    assert [h[0] for h in headers] == [kind, kind]
+    assert [h[1] for h in headers] == [1, 1]
+    assert [h[3] for h in headers] == [31, 777]
+    assert headers[0][2] != headers[1][2]
+
+
+def test_requests_carry_our_address_and_the_rounds_number():
+    rows = rows_of()
+    seq = asked(rows, 4, 8)
+    assert [(to, header_of(p)[:3]) for to, p in sent(rows)] == [
+        (4, [KIND_REQUEST, 1, seq]),
+        (8, [KIND_REQUEST, 1, seq]),
+    ]
+
+
+@given(st.integers(0, 15), st.integers(0, 7))
+def test_a_corrupt_packet_is_dropped(byte, bit):
+    rows = rows_of()
+    packet = bytearray(features(5, 40, asked(rows, 5)))
+    packet[byte] ^= 1 << bit
+    row = read(rows, bytes(packet))
+    assert dropped(row) == (1, 0)
+    assert (row["heard_id"] == -1).all()
+
+
+@pytest.mark.parametrize("length", range(16))
+def test_a_truncated_packet_is_dropped(length):
+    rows = rows_of()
+    row = read(rows, features(5, 40, asked(rows, 5))[:length])
+    assert dropped(row) == (1, 0)
+    assert (row["heard_id"] == -1).all()
+
+
+def test_a_foreign_packet_is_dropped():
+    assert dropped(read(rows_of(), b"hello, this is not for you", bytes(20), b"\xff" * 138)) == (3, 0)
+
+
+def test_our_own_packet_coming_back_is_dropped():
+    row = read(rows_of(), request(1, 3))
+    assert (dropped(row), int(row["ask_n"])) == ((0, 1), 0)
+
+
+def test_a_replayed_packet_is_dropped():
+    rows = rows_of()
+    packet = features(5, 40, asked(rows, 5))
+    assert dropped(read(rows, packet)) == (0, 0)
+    row = read(rows, packet, packet)
+    assert dropped(row) == (0, 2)
+    assert row["answers_n"] == 1
+
+
+def test_older_than_the_newest_of_its_sender_is_dropped_also_over_the_wrap():
+    rows = rows_of()
+    row = read(rows, request(5, 65530), request(5, 65529), request(5, 3), request(5, 65535))
+    assert row["ask_seq"][: row["ask_n"]].tolist() == [65530, 3]
+    assert dropped(row) == (0, 2)
+
+
+def test_unasked_for_features_are_dropped():
+    rows = rows_of()
+    assert dropped(read(rows, features(5, 40, 0))) == (0, 1)
+    seq = asked(rows, 5)
+    assert dropped(read(rows, features(5, 41, seq + 1))) == (0, 2)
+
+
+def test_an_answer_to_an_earlier_round_is_dropped():
+    rows = rows_of()
+    first = asked(rows, 5)
+    asked(rows, 5)
+    assert dropped(read(rows, features(5, 40, first))) == (0, 1)
+
+
+def test_an_answer_that_comes_too_late_is_dropped():
+    rows = rows_of(max_feature_age=1.5)
+    seq = asked(rows, 5)
+    rows.percepts["now_s"] += 1.6
+    row = read(rows, features(5, 40, seq))
+    assert dropped(row) == (0, 1)
+    assert (row["heard_id"] == -1).all()
+
+
+def test_features_are_forgotten_when_they_are_old():
+    rows = rows_of(max_feature_age=1.5)
+    row = read(rows, features(5, 40, asked(rows, 5)))
+    rows.percepts["now_s"] += 1.4
+    assert 5 in read(rows)["heard_id"]
+    rows.percepts["now_s"] += 0.2
+    assert 5 not in read(rows)["heard_id"]
+    assert dropped(row) == (0, 0)
+
+
+def test_waiting_ends_with_the_last_answer_or_with_the_patience():
+    rows = rows_of()
+    assert not waiting_for_answers(rows.percept, rows.memory, 0.6)
+    seq = asked(rows, 5, 6)
+    read(rows, features(5, 40, seq))
+    assert waiting_for_answers(rows.percept, rows.memory, 0.6)
+    read(rows, features(6, 2, seq))
+    assert not waiting_for_answers(rows.percept, rows.memory, 0.6)
+    asked(rows, 5)
+    rows.percepts["now_s"] += 0.7
+    assert not waiting_for_answers(rows.percept, rows.memory, 0.6)
+
+
+def test_more_senders_than_slots_keep_being_heard():
+    rows = rows_of()
+    for sender in range(100, 100 + 5 * PEERS):
+        row = read(rows, request(sender, 7))
+        assert row["ask_id"][0] == sender
+    assert dropped(row) == (0, 0)
+
+
+def test_a_full_outbox_takes_no_more():
+    rows = rows_of()
+    asked(rows, *range(100, 100 + MAX_OUTBOX + 5))
+    row = rows.decisions[0]
+    assert row["n_out"] == MAX_OUTBOX
+    assert rows.shared["asked_n"][0] == MAX_OUTBOX
+    read(rows, *(request(200 + k, 1) for k in range(MAX_INBOX)))
+    answer_all(rows.percept, rows.memory, rows.decision, rows.rig, np.zeros(MAX_FEATURES), np.zeros(MAX_FEATURES), 16)
+    assert rows.decisions[0]["n_out"] == MAX_OUTBOX
+
+
+packets = st.one_of(
+    st.binary(max_size=MAX_PACKET_BYTES),
+    st.builds(request, st.integers(0, 65535), st.integers(0, 65535)),
+    st.builds(features, st.integers(0, 65535), st.integers(0, 65535), st.integers(0, 3)),
+)
+
+
+@settings(max_examples=60)
+@given(st.lists(st.lists(packets, max_size=MAX_INBOX), max_size=12))
+def test_any_packets_in_any_order_leave_the_tables_whole(ticks):
+    rows = Rows(rig_of(), robots=3)
+    before = rows.shared.copy()
+    seen = 0
+    for k, inbox in enumerate(ticks):
+        rows.percepts["now_s"] = 0.2 * k
+        rows.decisions["n_out"] = 0
+        asked(rows, 5)
+        row = read(rows, *inbox)
+        seen += len(inbox)
+        assert 0 <= row["ask_n"] <= PEERS
+        assert ((row["heard_n"] >= 0) & (row["heard_n"] <= MAX_FEATURES)).all()
+        assert np.isfinite(row["heard_angle"]).all()
+        assert ((row["heard_distance"] >= 0.0) & (row["heard_distance"] <= RANGE_MAX)).all()
+        assert sum(dropped(row)) <= seen
+        answer_all(rows.percept, rows.memory, rows.decision, rows.rig, np.zeros(16), np.zeros(16), 16)
+        assert 0 <= rows.decisions[0]["n_out"] <= MAX_OUTBOX
+        for _, packet in sent(rows):
+            header_of(packet)
+    assert rows.shared[1:].tobytes() == before[1:].tobytes()
+
+
+def test_no_index_leaves_its_table():
+    """The same stress with plain Python kernels, where numpy checks every index."""
+    code = "import test_inbox as t; t.test_any_packets_in_any_order_leave_the_tables_whole()"
+    here = os.path.dirname(__file__)
+    path = os.pathsep.join([here, os.path.join(here, "..", ".."), *sys.path])
+    environment = os.environ | {"NUMBA_DISABLE_JIT": "1", "PYTHONPATH": path, "PYTHONWARNINGS": "error::RuntimeWarning"}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[-3000:]
