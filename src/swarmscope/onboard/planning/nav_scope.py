@@ -45,6 +45,8 @@ NAME = "nav-scope"
 SUMMARY = "Nav-SCOPE: safe directions, features of neighbours on request, fused choice of side, four states"
 NEEDS = "own scan, goal bearing and distance, relative poses of visible neighbours, features on request"
 LOG = 16
+LEAVE_GAIN = 0.5
+"""How much closer than ever before to the goal the free way must lead for a strict following to end [m]."""
 
 
 class Params(NamedTuple):
@@ -92,7 +94,8 @@ MEMORY = np.dtype(
         ("last_side", np.int8),  # side of the last following
         ("best", np.float64),  # smallest goal distance so far [m]
         ("best_s", np.float64),  # when
-        ("leave", np.float64),  # goal distance to beat before a strict following ends [m]
+        ("closest", np.float64),  # goal distance of the nearest free point ever seen on the straight way to the goal [m]
+        ("stuck_s", np.float64),  # how long without progress is a loop; doubles with every one in a row
         ("wait_s", np.float64),  # when the present wait began, -1 = none
         ("push_s", np.float64),  # until when waiting is not allowed
         ("log_n", np.int64),  # choices of a side so far
@@ -110,6 +113,7 @@ def new_memory(robots: int) -> np.ndarray:
     memory = np.zeros(robots, MEMORY)
     memory["wait_s"] = -1.0
     memory["best"] = np.inf
+    memory["closest"] = np.inf
     memory["left_at"] = -np.inf
     return memory
 
@@ -219,7 +223,7 @@ def decide(
         _say(decision, memory, ARRIVED, R_ARRIVED)
         return
     memory["travel"] += math.sqrt(percept["odom_x"] ** 2 + percept["odom_y"] ** 2)
-    _watch_progress(shared, memory, goal, now, params)
+    _watch_progress(memory, goal, now, params)
     sensor = rig.sensor
     bearing = percept["goal_bearing"]
     speed = arrival_speed(goal - 0.5 * params.arrive_m, rig.body.v_max, rig.body.a_max, percept["dt_s"])
@@ -234,7 +238,7 @@ def decide(
     else:
         beam = beam_of(bearing, sensor.angle_min, sensor.increment, sensor.beams, sensor.wraps)
         free = beam >= 0 and safe[beam] == 1
-    if free and _may_leave(memory, goal):
+    if free and (memory["strict"] == 0 or _may_leave(masked, percept, memory, rig)):
         if memory["mode"] == FOLLOW:
             memory["left_at"], memory["last_side"] = memory["travel"], memory["side"]
         memory["side"] = 0
@@ -245,6 +249,7 @@ def decide(
         _request_ahead(masked, percept, shared, decision, rig, params)
     else:
         if memory["mode"] != FOLLOW:
+            memory["closest"] = min(memory["closest"], _nearest_in_sight(masked, percept, rig))
             if not _decide_side(percept, shared, memory, decision, rig, params, safe, features, distances, count):
                 return
         _follow(ranges, masked, percept, memory, decision, safe, safe_count, narrow, edges, rig, params, speed)
@@ -253,16 +258,18 @@ def decide(
 
 
 @jit_inline
-def _watch_progress(shared: np.ndarray, memory: np.ndarray, goal: float, now: float, params: Params) -> None:
+def _watch_progress(memory: np.ndarray, goal: float, now: float, params: Params) -> None:
     """Notice a following that gets no closer to the goal for long: follow strictly, then on the other side."""
     if goal < memory["best"] - 0.3:
-        memory["best"], memory["best_s"] = goal, now
-    if memory["mode"] != FOLLOW or now - memory["best_s"] < params.stuck_s:
+        memory["best"], memory["best_s"], memory["stuck_s"] = goal, now, params.stuck_s
+    if memory["mode"] != FOLLOW or now - memory["best_s"] < memory["stuck_s"]:
         return
-    memory["best"], memory["best_s"] = goal, now
+    memory["best_s"] = now
+    memory["stuck_s"] = 2.0 * memory["stuck_s"]
     if memory["strict"]:
         memory["side"] = -memory["side"]
-    _start_strict(shared, memory, goal)
+        memory["wind"] = max(0.0, TWO_PI - memory["wind"])
+    memory["strict"] = 1
 
 
 @jit
@@ -284,9 +291,21 @@ def _say(decision: np.ndarray, memory: np.ndarray, state: int, reason: int) -> N
 
 
 @jit_inline
-def _may_leave(memory: np.ndarray, goal: float) -> bool:
-    """Tell whether a following may end: always, but after a loop only closer to the goal than ever before."""
-    return memory["strict"] == 0 or goal < memory["leave"]
+def _may_leave(masked: np.ndarray, percept: np.ndarray, memory: np.ndarray, rig: Rig) -> bool:
+    """Tell whether a strict following may end: the way to the goal is seen free until closer than ever before."""
+    in_sight = _nearest_in_sight(masked, percept, rig)
+    return in_sight <= 0.0 or in_sight < memory["closest"] - LEAVE_GAIN
+
+
+@jit
+def _nearest_in_sight(masked: np.ndarray, percept: np.ndarray, rig: Rig) -> float:
+    """Return the goal distance [m] up to which the straight way to the goal is seen to be free."""
+    sensor = rig.sensor
+    goal = percept["goal_distance"]
+    limit = min(goal, sensor.range_max)
+    return goal - corridor_length(
+        masked, sensor.range_min, sensor.angle_min, sensor.increment, percept["goal_bearing"], rig.footprint, limit
+    )
 
 
 @jit
@@ -372,7 +391,7 @@ def _break_loop(percept: np.ndarray, shared: np.ndarray, memory: np.ndarray, par
         if memory["travel"] - memory["log_travel"][j] < 2.0 * params.loop_m:
             continue
         if d < params.loop_m and goal > memory["log_goal"][j] - 0.2:
-            _start_strict(shared, memory, goal)
+            memory["strict"] = 1
             side = memory["log_side"][j]
             break
     j = memory["log_n"] % LOG
@@ -380,13 +399,6 @@ def _break_loop(percept: np.ndarray, shared: np.ndarray, memory: np.ndarray, par
     memory["log_side"][j], memory["log_travel"][j] = side, memory["travel"]
     memory["log_n"] += 1
     return side
-
-
-@jit_inline
-def _start_strict(shared: np.ndarray, memory: np.ndarray, goal: float) -> None:
-    """Begin a strict following here: it ends closer to the goal than here."""
-    memory["strict"] = 1
-    memory["leave"] = goal - 0.1
 
 
 @jit
