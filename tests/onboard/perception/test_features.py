@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 import pytest
-from helpers import circles_world, rig_of, scan_at
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
+from helpers import circles_world, rig_of, scan_at
 from swarmscope.onboard.perception.features import align_features, extrema, reconstruct
 from swarmscope.onboard.perception.filters import filter_padded, prepare_scan
 from swarmscope.onboard.sharing.message import MAX_FEATURES

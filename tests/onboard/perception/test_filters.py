@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 import pytest
-from helpers import make_sensor
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
+from helpers import make_sensor
 from swarmscope.onboard.perception.filters import (
     feature_filter,
     filter_padded,

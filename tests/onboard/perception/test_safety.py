@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 import pytest
-from helpers import circles_world, make_sensor, rig_of, scan_at
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
+from helpers import circles_world, make_sensor, rig_of, scan_at
 from swarmscope.onboard.perception.safety import (
     BINS,
     beam_of,

@@ -8,10 +8,10 @@ import sys
 
 import numpy as np
 import pytest
-from helpers import Rows, rig_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from helpers import Rows, rig_of
 from swarmscope.onboard.percept import MAX_INBOX, MAX_OUTBOX, PEERS
 from swarmscope.onboard.sharing.inbox import (
     answer_all,

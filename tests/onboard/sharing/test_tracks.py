@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 import pytest
-from helpers import DT, Rows, circles_world, make_sensor, rig_of, scan_at
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from helpers import DT, Rows, circles_world, make_sensor, rig_of, scan_at
 from swarmscope.onboard.percept import PEERS
 from swarmscope.onboard.sharing.tracks import mask_moving_neighbours, update_odometry, update_tracks
 from swarmscope.sim.lidar import make_beams

@@ -1,0 +1,158 @@
+"""The radio: range, latency, loss, bandwidth, counting, and full queues."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from helpers import DT, place_sim
+from swarmscope.sim.cells import index_robots
+from swarmscope.sim.radio import exchange
+from swarmscope.sim.sensing import sense
+from swarmscope.sim.state import QUEUE, Radio
+
+REQUEST, FEATURES = 7, 26
+
+
+def line(robots=2, gap=1.0, **radio):
+    sim, _, _ = place_sim([(gap * k, 0.0, 0.0) for k in range(robots)], radio=Radio(**radio))
+    index_robots(sim)
+    return sim
+
+
+def post(sim, i, *packets):
+    """Fill robot i's outbox with packets (to, length)."""
+    sim.decisions["n_out"][i] = len(packets)
+    for k, (to, length) in enumerate(packets):
+        sim.decisions["out_to"][i, k], sim.decisions["out_length"][i, k] = to, length
+        sim.decisions["out"][i, k, :length] = 10 * i + k + np.arange(length)
+
+
+def heard(sim, i, tick):
+    sense(sim, tick, i, i + 1)
+    row = sim.percepts[i]
+    return [row["packet"][k, : row["packet_length"][k]].tolist() for k in range(row["n_packets"])]
+
+
+def counters(sim, i, *names):
+    return [int(sim.robots[i][name]) for name in names]
+
+
+def test_a_packet_arrives_whole_at_its_receiver_and_nobody_else():
+    sim = line(3)
+    post(sim, 0, (2, FEATURES))
+    exchange(sim, 0)
+    assert heard(sim, 2, 1) == [list(range(FEATURES))]
+    assert heard(sim, 1, 1) == []
+    assert heard(sim, 0, 1) == []
+
+
+@pytest.mark.parametrize(("latency_s", "ticks"), [(0.005, 1), (0.15, 1), (0.25, 2), (0.9, 5)])
+def test_latency_in_ticks(latency_s, ticks):
+    sim = line(latency_s=latency_s)
+    post(sim, 0, (1, REQUEST))
+    exchange(sim, 0)
+    arrived = [tick for tick in range(1, 10) if heard(sim, 1, tick)]
+    assert arrived == [ticks]
+
+
+def test_bytes_on_the_air_are_counted_apart_from_the_payload():
+    sim = line(3, overhead_bytes=23)
+    post(sim, 0, (1, REQUEST), (2, FEATURES))
+    exchange(sim, 0)
+    assert counters(sim, 0, "sent", "bytes", "air_bytes") == [2, REQUEST + FEATURES, REQUEST + FEATURES + 46]
+    assert counters(sim, 0, "sent_features", "feature_bytes") == [1, FEATURES]
+    assert sim.links[: sim.links_n[0]].tolist() == [[0, 0, 2, FEATURES]]
+    assert counters(sim, 1, "sent", "bytes", "air_bytes") == [0, 0, 0]
+
+
+def test_beyond_the_range_nothing_arrives():
+    sim = line(2, gap=5.0, range_m=4.9)
+    post(sim, 0, (1, REQUEST))
+    exchange(sim, 0)
+    assert heard(sim, 1, 5) == []
+    assert counters(sim, 0, "sent", "unreachable") == [1, 1]
+    sim = line(2, gap=5.0, range_m=5.1)
+    post(sim, 0, (1, REQUEST))
+    exchange(sim, 0)
+    assert len(heard(sim, 1, 5)) == 1
+
+
+def test_crashed_robots_neither_send_nor_receive():
+    sim = line(2)
+    sim.robots["crashed"][1] = 1
+    post(sim, 0, (1, REQUEST))
+    post(sim, 1, (0, REQUEST))
+    exchange(sim, 0)
+    assert counters(sim, 0, "sent", "unreachable", "queued") == [1, 1, 0]
+    assert counters(sim, 1, "sent", "queued") == [0, 0]
+
+
+@pytest.mark.parametrize("to", [-1, 2, 10**9])
+def test_addresses_that_nobody_has_are_ignored(to):
+    sim = line(2)
+    post(sim, 0, (to, REQUEST))
+    exchange(sim, 0)
+    assert counters(sim, 0, "sent", "bytes") == [0, 0]
+
+
+@pytest.mark.parametrize("loss", [0.0, 0.3, 1.0])
+def test_the_given_share_is_lost_and_the_same_for_the_same_seed(loss):
+    totals = []
+    for _ in range(2):
+        sim = line(2, loss=loss, bitrate=1e9)
+        lost = []
+        for tick in range(1500):
+            post(sim, 0, (1, REQUEST), (1, FEATURES))
+            exchange(sim, tick)
+            lost.append(int(sim.robots[0]["lost"]))
+            heard(sim, 1, tick + 1)
+        totals.append(lost)
+        assert int(sim.robots[0]["sent"]) == 3000
+    assert totals[0] == totals[1]
+    assert totals[0][-1] / 3000 == pytest.approx(loss, abs=0.03)
+
+
+def test_packets_of_one_tick_share_the_channel():
+    """At 8 kbit/s and 30 bytes on the air a packet takes 30 ms: five last 150 ms, in their order."""
+    sim = line(2, bitrate=8000.0, overhead_bytes=23, latency_s=0.0)
+    post(sim, 0, *[(1, REQUEST)] * 5)
+    exchange(sim, 0)
+    assert sim.queue_due[1, :5] == pytest.approx(0.03 * np.arange(1, 6))
+    assert float(sim.robots[1]["radio_free_s"]) == pytest.approx(0.15)
+
+
+def test_a_receiver_that_listens_to_one_keeps_the_other_waiting():
+    sim = line(3, bitrate=8000.0, overhead_bytes=23, latency_s=0.0)
+    post(sim, 0, (2, REQUEST))
+    post(sim, 1, (2, REQUEST))
+    exchange(sim, 0)
+    assert sim.queue_due[2, :2] == pytest.approx([0.03, 0.06])
+
+
+def test_a_packet_that_would_wait_too_long_is_dropped_and_counted():
+    sim = line(2, bitrate=800.0, overhead_bytes=23, max_wait_s=0.5)
+    post(sim, 0, *[(1, REQUEST)] * 5)  # 0.3 s each
+    exchange(sim, 0)
+    assert counters(sim, 0, "sent", "crowded") == [2, 3]
+    assert counters(sim, 1, "queued") == [2]
+
+
+def test_a_full_queue_takes_no_more_and_stays_whole():
+    sim = line(8, latency_s=100.0, bitrate=1e9)
+    for tick in range(2):
+        for i in range(1, 8):
+            post(sim, i, *[(0, REQUEST)] * 8)
+        exchange(sim, tick)
+    assert counters(sim, 0, "queued") == [QUEUE]
+    assert sum(counters(sim, i, "crowded")[0] for i in range(8)) == 2 * 7 * 8 - QUEUE
+    assert sim.queue_from[0, :8].tolist() == [1] * 8
+    assert (sim.queue_length[1:] == 0).all()
+
+
+def test_the_channel_is_free_again_later():
+    sim = line(2, bitrate=8000.0, latency_s=0.0)
+    for tick in range(3):
+        post(sim, 0, (1, REQUEST))
+        exchange(sim, 10 * tick)
+    assert sim.queue_due[1, :3] == pytest.approx(10 * DT * np.arange(3) + 0.03)
