@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from swarmscope._jit import jit
+from swarmscope._jit import jit, jit_inner
 from swarmscope.onboard.percept import Rig
 from swarmscope.sim.cells import index_robots
 from swarmscope.sim.lidar import Beams
@@ -67,7 +67,7 @@ class Trace:
 
 
 @jit
-def _record(sim: Sim, safe: np.ndarray, records: Records, row: int, with_scans: bool) -> None:
+def record_tick(sim: Sim, safe: np.ndarray, records: Records, row: int, with_scans: bool) -> None:
     """Write this tick into row ``row`` of the records."""
     beams = sim.ranges.shape[1]
     for i in range(sim.robots.size):
@@ -91,18 +91,18 @@ def _record(sim: Sim, safe: np.ndarray, records: Records, row: int, with_scans: 
 
 
 @jit
-def _world_phase(
+def world_phase(
     sim: Sim, safe: np.ndarray, records: Records, row: int, with_scans: bool, tick: int
 ) -> bool:
     """Record tick ``tick``, then exchange, move, judge and sense the next; return whether everybody is done."""
-    _record(sim, safe, records, row, with_scans)
+    record_tick(sim, safe, records, row, with_scans)
     exchange(sim, tick)
     move(sim, tick, 0, sim.robots.size)
-    return _settle(sim, tick) or _sense_next(sim, tick)
+    return settle(sim, tick) or _sense_next(sim, tick)
 
 
 @jit
-def _settle(sim: Sim, tick: int) -> bool:
+def settle(sim: Sim, tick: int) -> bool:
     """Judge the tick and sort the robots anew; return whether everybody has arrived or crashed."""
     judge(sim, tick)
     index_robots(sim)
@@ -112,7 +112,7 @@ def _settle(sim: Sim, tick: int) -> bool:
     return True
 
 
-@jit
+@jit_inner
 def _sense_next(sim: Sim, tick: int) -> bool:
     """Sense tick ``tick + 1`` for all robots; always False."""
     sense(sim, tick + 1, 0, sim.robots.size)
@@ -160,13 +160,13 @@ def run(setting: Setting, progress: Callable[[float, int], None] | None = None) 
         else:
             pool.each(lambda a, b: step_all(a, b, *arguments))
         if pool.size == 1:
-            done = _world_phase(sim, scratch.safe, chunks[-1], row, beams > 0, tick)
+            done = world_phase(sim, scratch.safe, chunks[-1], row, beams > 0, tick)
         else:
-            _record(sim, scratch.safe, chunks[-1], row, beams > 0)
+            record_tick(sim, scratch.safe, chunks[-1], row, beams > 0)
             exchange(sim, tick)
             now = tick
             pool.each(lambda a, b: move(sim, now, a, b))
-            done = _settle(sim, tick)
+            done = settle(sim, tick)
             if not done:
                 pool.each(lambda a, b: sense(sim, now + 1, a, b))
         tick += 1

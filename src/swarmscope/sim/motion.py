@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from swarmscope._jit import jit, jit_inline
+from swarmscope._jit import jit, jit_inner
 from swarmscope.geometry import point_segment_distance, wrap_angle
 from swarmscope.onboard.planning._contract import ARRIVED
 from swarmscope.sim.cells import column_of, row_of
@@ -23,7 +23,7 @@ def move(sim: Sim, tick: int, first: int, last: int) -> None:
         _meet_static(sim, i)
 
 
-@jit_inline
+@jit_inner
 def _drive(sim: Sim, i: int) -> None:
     """Integrate robot i: speed follows the command within a_max, the turn rate at once within w_max."""
     robot, decision, path = sim.robots[i], sim.decisions[i], sim.path[i]
@@ -56,7 +56,7 @@ def _drive(sim: Sim, i: int) -> None:
     robot["x"], robot["y"], robot["yaw"], robot["v"] = x, y, wrap_angle(yaw + w * sim.clock.dt), v
 
 
-@jit_inline
+@jit_inner
 def _meet_static(sim: Sim, i: int) -> None:
     """Measure robot i's clearance to the world along its path; stop it where it touches."""
     robot, path = sim.robots[i], sim.path[i]
@@ -76,7 +76,7 @@ def _meet_static(sim: Sim, i: int) -> None:
     robot["clearance"] = best
 
 
-@jit_inline
+@jit_inner
 def _stop_at(sim: Sim, i: int, k: int) -> None:
     """Leave robot i at step k of its path, crashed."""
     robot, path = sim.robots[i], sim.path[i]
@@ -110,7 +110,7 @@ def judge(sim: Sim, tick: int) -> None:
             robot["length"] += math.sqrt(gx * gx + gy * gy)
 
 
-@jit_inline
+@jit_inner
 def _meet_robots(sim: Sim, i: int) -> None:
     """Check robot i's path against every near robot with a larger number, both moving."""
     robot, path = sim.robots[i], sim.path[i]

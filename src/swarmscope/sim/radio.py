@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from swarmscope._jit import jit
+from swarmscope._jit import jit, jit_inner
 from swarmscope.onboard.sharing.message import REQUEST_BYTES
 from swarmscope.sim.state import LINKS, QUEUE, Sim
 from swarmscope.sim.streams import RADIO_LOSS, key, mix, uniform
@@ -22,7 +22,7 @@ def exchange(sim: Sim, tick: int) -> None:
             _send(sim, tick, i, k)
 
 
-@jit
+@jit_inner
 def _send(sim: Sim, tick: int, i: int, k: int) -> None:
     """Send packet k of robot i: count it, then lose it, refuse it or queue it."""
     sender, decision, radio = sim.robots[i], sim.decisions[i], sim.radio

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from swarmscope._jit import jit, jit_inline
+from swarmscope._jit import jit, jit_inner
 from swarmscope.geometry import wrap_angle
 from swarmscope.onboard.percept import MAX_INBOX, MAX_NEIGHBOURS
 from swarmscope.sim.cells import column_of, row_of
@@ -36,7 +36,7 @@ def sense(sim: Sim, tick: int, first: int, last: int) -> None:
         _receive(sim, tick, i)
 
 
-@jit_inline
+@jit_inner
 def _compass_error(sim: Sim, tick: int, i: int) -> float:
     """Return the error of robot i's compass at this tick [rad]."""
     if sim.noise.compass_sigma <= 0.0:
@@ -44,7 +44,7 @@ def _compass_error(sim: Sim, tick: int, i: int) -> float:
     return sim.noise.compass_sigma * normal(key(sim.clock.seed, i, tick, COMPASS_NOISE))
 
 
-@jit_inline
+@jit_inner
 def _sense_self(sim: Sim, tick: int, i: int) -> None:
     """Fill clock, compass, goal and odometry of robot i."""
     robot, percept = sim.robots[i], sim.percepts[i]
@@ -63,7 +63,7 @@ def _sense_self(sim: Sim, tick: int, i: int) -> None:
     robot["last_x"], robot["last_y"], robot["last_yaw"] = robot["x"], robot["y"], robot["yaw"]
 
 
-@jit
+@jit_inner
 def _scan_and_neighbours(sim: Sim, tick: int, i: int) -> None:
     """Cast robot i's scan and list the neighbours in its line of sight, nearest first."""
     robot, percept, ranges = sim.robots[i], sim.percepts[i], sim.ranges[i]
@@ -96,7 +96,7 @@ def _scan_and_neighbours(sim: Sim, tick: int, i: int) -> None:
                 ranges[n] = math.nan
 
 
-@jit_inline
+@jit_inner
 def _insert(percept: object, found: int, j: int, bx: float, by: float) -> int:
     """Insert neighbour j into the list sorted by distance; return its new length."""
     ids, xs, ys = percept["neighbour_id"], percept["neighbour_x"], percept["neighbour_y"]
@@ -113,7 +113,7 @@ def _insert(percept: object, found: int, j: int, bx: float, by: float) -> int:
     return min(MAX_NEIGHBOURS, found + 1)
 
 
-@jit_inline
+@jit_inner
 def _keep_visible(sim: Sim, tick: int, i: int, found: int) -> None:
     """Keep the neighbours in line of sight by robot i's own (noise-free) scan; add the sensor's errors."""
     percept, ranges, beams, noise = sim.percepts[i], sim.ranges[i], sim.beams, sim.noise
@@ -142,7 +142,7 @@ def _keep_visible(sim: Sim, tick: int, i: int, found: int) -> None:
     percept["n_neighbours"] = kept
 
 
-@jit_inline
+@jit_inner
 def _receive(sim: Sim, tick: int, i: int) -> None:
     """Hand over the packets that have arrived, oldest first; the rest stays in the queue."""
     robot, percept = sim.robots[i], sim.percepts[i]

@@ -22,6 +22,8 @@ from swarmscope.onboard.perception.safety import (
 
 RANGE_MAX, L_TH, HALF = 5.0, 0.6, 30
 INCREMENT = math.radians(1.0)
+BEAM_ANGLES = -math.pi + INCREMENT * np.arange(360)
+COS, SIN = np.cos(BEAM_ANGLES), np.sin(BEAM_ANGLES)
 BIN = RANGE_MAX / BINS
 ROUNDED_L_TH = math.ceil(L_TH / BIN) * BIN
 SECTOR = reach_table(INCREMENT, RANGE_MAX, 0.0, L_TH, math.radians(HALF), 0.0, 0.0)
@@ -180,7 +182,7 @@ def test_beam_of_outside_the_field_of_view():
 @given(scans(360), st.floats(-math.pi, math.pi), st.floats(0.05, 3.0))
 def test_corridor_length_is_how_far_the_disc_gets(ranges, bearing, limit):
     half_width = 0.18
-    free = corridor_length(ranges, 0.0, -math.pi, INCREMENT, bearing, half_width, limit)
+    free = corridor_length(ranges, 0.0, COS, SIN, bearing, half_width, limit)
     angles = -math.pi + INCREMENT * np.arange(360)
     seen = np.isfinite(ranges)
     s = ranges[seen].astype(float)
@@ -197,5 +199,5 @@ def test_corridor_length_is_how_far_the_disc_gets(ranges, bearing, limit):
 def test_an_invalid_beam_closes_the_corridor_ahead_only():
     ranges = np.full(360, math.inf, np.float32)
     ranges[180] = math.nan
-    assert corridor_length(ranges, 0.1, -math.pi, INCREMENT, 0.0, 0.18, 2.0) == 0.0
-    assert corridor_length(ranges, 0.1, -math.pi, INCREMENT, math.pi, 0.18, 2.0) == 2.0
+    assert corridor_length(ranges, 0.1, COS, SIN, 0.0, 0.18, 2.0) == 0.0
+    assert corridor_length(ranges, 0.1, COS, SIN, math.pi, 0.18, 2.0) == 2.0

@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from swarmscope._jit import jit, jit_inline
+from swarmscope._jit import jit, jit_inner
 from swarmscope.geometry import point_segment_distance
 from swarmscope.onboard.control.unicycle import steer
 from swarmscope.onboard.percept import PEERS, Rig
@@ -49,7 +49,7 @@ def guard(
     return True
 
 
-@jit_inline
+@jit_inner
 def _near_beams(ranges: np.ndarray, dt: float, rig: Rig, near: np.ndarray) -> int:
     """Collect the beams that could matter within this tick's motion and the braking after it; return how many."""
     body = rig.body
@@ -63,7 +63,7 @@ def _near_beams(ranges: np.ndarray, dt: float, rig: Rig, near: np.ndarray) -> in
     return count
 
 
-@jit
+@jit_inner
 def _passes(
     ranges: np.ndarray,
     percept: np.ndarray,
@@ -128,7 +128,7 @@ def _passes(
     return True
 
 
-@jit_inline
+@jit_inner
 def _point_gap(percept: np.ndarray, shared: np.ndarray, px: float, py: float, rig: Rig) -> bool:
     """Tell whether the return at (px, py), body frame, may belong to a neighbour."""
     c, s = math.cos(percept["compass"]), math.sin(percept["compass"])
@@ -143,7 +143,7 @@ def _point_gap(percept: np.ndarray, shared: np.ndarray, px: float, py: float, ri
     return False
 
 
-@jit_inline
+@jit_inner
 def _in_own_half(
     px: float, py: float, s: float, x4: float, y4: float, x5: float, y5: float, brake: float, rig: Rig
 ) -> bool:
@@ -162,7 +162,7 @@ def _in_own_half(
     return towards + max(0.0, stopped - moved) <= 0.5 * (s - rig.body.radius - rig.clearance)
 
 
-@jit_inline
+@jit_inner
 def _clear_of_tracks(
     percept: np.ndarray, shared: np.ndarray, x4: float, y4: float, x5: float, y5: float, brake: float, rig: Rig
 ) -> bool:

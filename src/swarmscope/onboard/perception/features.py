@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from swarmscope._jit import jit, jit_inline
+from swarmscope._jit import jit, jit_inner
 from swarmscope.geometry import TWO_PI, positive_angle
 
 FLAT = 1e-5
@@ -62,7 +62,7 @@ def extrema(
     return count
 
 
-@jit_inline
+@jit_inner
 def _sort_by_angle(angles: np.ndarray, distances: np.ndarray, count: int) -> None:
     """Sort the first ``count`` pairs by angle, in place (insertion sort: a handful of pairs)."""
     for i in range(1, count):

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from swarmscope._jit import jit, jit_inline
+from swarmscope._jit import jit, jit_inner
 
 
 BINS = 512
@@ -95,7 +95,7 @@ def safe_directions(
     return count
 
 
-@jit_inline
+@jit_inner
 def _block(edges: np.ndarray, beams: int, wraps: bool, first: int, last: int) -> None:
     """Add the run of beams first..last to the difference array ``edges``."""
     if last - first + 1 >= beams:
@@ -128,30 +128,27 @@ def beam_of(bearing: float, angle_min: float, increment: float, beams: int, wrap
 def corridor_length(
     ranges: np.ndarray,
     range_min: float,
-    angle_min: float,
-    increment: float,
+    cos: np.ndarray,
+    sin: np.ndarray,
     bearing: float,
     half_width: float,
     limit: float,
 ) -> float:
     """Return how far [m] a disc of radius ``half_width`` gets along ``bearing`` before it touches a return.
 
-    At most ``limit``; an invalid beam within 90 degrees of the bearing stops it at once.
+    ``cos``, ``sin (M,)`` are the beams' directions. At most ``limit``; an invalid beam within 90 degrees of
+    the bearing stops it at once.
     """
     free = limit
-    reach = limit + half_width
+    c, s = math.cos(bearing), math.sin(bearing)
     for n in range(ranges.size):
-        s = ranges[n]
-        if s > reach:
+        r = ranges[n]
+        ahead = cos[n] * c + sin[n] * s
+        if not ahead > 0.0 or r == np.inf:
             continue
-        turn = angle_min + n * increment - bearing
-        along = math.cos(turn)
-        if not s >= range_min:
-            if along > 0.0:
-                return 0.0
-            continue
-        across = s * math.sin(turn)
-        if along <= 0.0 or abs(across) >= half_width:
-            continue
-        free = min(free, s * along - math.sqrt(half_width * half_width - across * across))
+        if not r >= range_min:
+            return 0.0
+        across = r * (sin[n] * c - cos[n] * s)
+        if abs(across) < half_width:
+            free = min(free, r * ahead - math.sqrt(half_width * half_width - across * across))
     return max(0.0, free)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from swarmscope._jit import jit
+from swarmscope._jit import jit, jit_inner
 from swarmscope.geometry import wrap_angle
 from swarmscope.onboard.percept import PEERS, Rig
 from swarmscope.onboard.perception.areas import normalise, passable_distance, quadrant_area
@@ -88,14 +88,14 @@ def choose_side(
     return 1 if p_left >= 0.5 else -1
 
 
-@jit
+@jit_inner
 def _normalise_all(distances: np.ndarray, count: int, range_max: float) -> None:
     """Apply (SFM-MAS 25) to the first ``count`` distances in place."""
     for j in range(count):
         distances[j] = normalise(distances[j], range_max)
 
 
-@jit
+@jit_inner
 def _heard_of(shared: np.ndarray, peer: int) -> int:
     """Return the slot with the features of ``peer``, or -1."""
     for p in range(PEERS):

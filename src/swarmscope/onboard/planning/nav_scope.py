@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmscope._jit import jit, jit_inline
+from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.geometry import TWO_PI, angle_from, wrap_angle
 from swarmscope.onboard.control.guard import halt, head_for
 from swarmscope.onboard.control.unicycle import FULL_SPEED_WITHIN, arrival_speed
@@ -231,7 +231,7 @@ def decide(
     if final:
         free = (
             corridor_length(
-                masked, sensor.range_min, sensor.angle_min, sensor.increment, bearing, rig.footprint, goal
+                masked, sensor.range_min, rig.cos, rig.sin, bearing, rig.footprint, goal
             )
             >= goal
         )
@@ -257,7 +257,7 @@ def decide(
     memory["heading"] = percept["compass"] + decision["heading"]
 
 
-@jit_inline
+@jit_inner
 def _watch_progress(memory: np.ndarray, goal: float, now: float, params: Params) -> None:
     """Notice a following that gets no closer to the goal for long: follow strictly, then on the other side."""
     if goal < memory["best"] - 0.3:
@@ -284,31 +284,31 @@ def wants_features(percept: np.ndarray, shared: np.ndarray, memory: np.ndarray, 
     return beam < 0 or safe[beam] == 0
 
 
-@jit_inline
+@jit_inner
 def _say(decision: np.ndarray, memory: np.ndarray, state: int, reason: int) -> None:
     """Note state and reason for people to read."""
     decision["state"], decision["reason"], decision["side"] = state, reason, memory["side"]
 
 
-@jit_inline
+@jit_inner
 def _may_leave(masked: np.ndarray, percept: np.ndarray, memory: np.ndarray, rig: Rig) -> bool:
     """Tell whether a strict following may end: the way to the goal is seen free until closer than ever before."""
     in_sight = _nearest_in_sight(masked, percept, rig)
     return in_sight <= 0.0 or in_sight < memory["closest"] - LEAVE_GAIN
 
 
-@jit
+@jit_inner
 def _nearest_in_sight(masked: np.ndarray, percept: np.ndarray, rig: Rig) -> float:
     """Return the goal distance [m] up to which the straight way to the goal is seen to be free."""
     sensor = rig.sensor
     goal = percept["goal_distance"]
     limit = min(goal, sensor.range_max)
     return goal - corridor_length(
-        masked, sensor.range_min, sensor.angle_min, sensor.increment, percept["goal_bearing"], rig.footprint, limit
+        masked, sensor.range_min, rig.cos, rig.sin, percept["goal_bearing"], rig.footprint, limit
     )
 
 
-@jit
+@jit_inner
 def _request_ahead(
     masked: np.ndarray, percept: np.ndarray, shared: np.ndarray, decision: np.ndarray, rig: Rig, params: Params
 ) -> None:
@@ -330,7 +330,7 @@ def _request_ahead(
             return
 
 
-@jit
+@jit_inner
 def _ask_neighbours(percept: np.ndarray, shared: np.ndarray, decision: np.ndarray, rig: Rig) -> None:
     """Start a round of requests to every neighbour seen now in the pass band (sigma_a, 3 sigma_a]."""
     start_round(percept, shared)
@@ -343,7 +343,7 @@ def _ask_neighbours(percept: np.ndarray, shared: np.ndarray, decision: np.ndarra
             ask(percept, shared, decision, percept["neighbour_id"][k])
 
 
-@jit
+@jit_inner
 def _decide_side(
     percept: np.ndarray,
     shared: np.ndarray,
@@ -380,7 +380,7 @@ def _decide_side(
     return True
 
 
-@jit
+@jit_inner
 def _break_loop(percept: np.ndarray, shared: np.ndarray, memory: np.ndarray, params: Params, side: int) -> int:
     """Log the choice; when it repeats an earlier one without progress, follow strictly on that earlier side."""
     x, y, goal = shared["x"], shared["y"], percept["goal_distance"]
@@ -401,7 +401,7 @@ def _break_loop(percept: np.ndarray, shared: np.ndarray, memory: np.ndarray, par
     return side
 
 
-@jit
+@jit_inner
 def _follow(
     ranges: np.ndarray,
     masked: np.ndarray,
@@ -457,7 +457,7 @@ def _follow(
     decision["state"], decision["reason"], decision["side"] = state, reason, side
 
 
-@jit_inline
+@jit_inner
 def _keep_turning(
     masked: np.ndarray,
     percept: np.ndarray,
@@ -525,7 +525,7 @@ def away_from_nearest(ranges: np.ndarray, rig: Rig) -> float:
     return wrap_angle(rig.sensor.angle_min + at * rig.sensor.increment + math.pi)
 
 
-@jit
+@jit_inner
 def _yield(
     percept: np.ndarray, shared: np.ndarray, memory: np.ndarray, decision: np.ndarray, rig: Rig, params: Params
 ) -> None:
@@ -544,7 +544,7 @@ def _yield(
     decision["state"], decision["reason"] = YIELD, R_YIELD
 
 
-@jit
+@jit_inner
 def _must_wait(
     percept: np.ndarray, shared: np.ndarray, decision: np.ndarray, rig: Rig, params: Params
 ) -> bool:

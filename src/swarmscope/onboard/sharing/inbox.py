@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from swarmscope._jit import jit, jit_inline
+from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.onboard.percept import MAX_OUTBOX, PEERS, Rig
 from swarmscope.onboard.sharing.message import (
     KIND_REQUEST,
@@ -55,7 +55,7 @@ def read_inbox(percept: np.ndarray, shared: np.ndarray, rig: Rig, header: np.nda
         _remember(shared, header[1], count, angles, distances)
 
 
-@jit_inline
+@jit_inner
 def _is_new(shared: np.ndarray, sender: int, seq: int) -> bool:
     """Tell whether ``seq`` is newer than everything accepted from ``sender``, and note it."""
     slot = -1
@@ -74,7 +74,7 @@ def _is_new(shared: np.ndarray, sender: int, seq: int) -> bool:
     return True
 
 
-@jit_inline
+@jit_inner
 def _remember(shared: np.ndarray, sender: int, count: int, angles: np.ndarray, distances: np.ndarray) -> None:
     """Store the features of ``sender``, in its slot, a free one, or the oldest."""
     slot = -1

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from swarmscope._jit import jit, jit_inline
+from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.onboard.percept import PEERS, Rig
 
 STILL_RADIUS = 0.08
@@ -74,7 +74,7 @@ def update_tracks(percept: np.ndarray, shared: np.ndarray, rig: Rig, dx: float, 
     _limit_speed_and_anchor(shared, rig, now)
 
 
-@jit
+@jit_inner
 def _limit_speed_and_anchor(shared: np.ndarray, rig: Rig, now: float) -> None:
     """Clip estimated speeds to what the robots can do, slow unseen ones down, notice who stands still."""
     for t in range(PEERS):
@@ -97,7 +97,7 @@ def _limit_speed_and_anchor(shared: np.ndarray, rig: Rig, now: float) -> None:
             shared["track_moved_s"][t] = now
 
 
-@jit_inline
+@jit_inner
 def _find(shared: np.ndarray, peer: int) -> int:
     """Return the track of ``peer``, or -1."""
     for t in range(PEERS):
@@ -106,7 +106,7 @@ def _find(shared: np.ndarray, peer: int) -> int:
     return -1
 
 
-@jit_inline
+@jit_inner
 def _place(shared: np.ndarray, x: float, y: float) -> int:
     """Return a free track, else the farthest one if it is farther than (x, y), else -1."""
     worst, worst_d2 = -1, x * x + y * y
