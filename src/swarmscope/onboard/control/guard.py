@@ -108,7 +108,7 @@ def _passes(
     for k in range(count):
         n = near[k]
         s = ranges[n]
-        if not s >= rig.sensor.range_min:
+        if not s >= max(rig.sensor.range_min, 0.5 * body.radius):  # invalid, or inside the body: forbid that way
             s = body.radius + rig.clearance
         px, py = s * rig.cos[n], s * rig.sin[n]
         gap = _point_gap(percept, shared, px, py, rig)
