@@ -41,7 +41,9 @@ def _run(sim, shared, rig, near, ticks, mode):
             decision["w"] = sim.w_max * (2.4 * uniform(key(sim.clock.seed, i, when, 102)) - 1.2)
             if mode == CHASE and uniform(key(sim.clock.seed, i, tick // 5, 103)) < 0.8:
                 decision["v"] = sim.v_max
-                decision["w"] = _nearest_bearing(sim.ranges[i], rig.sensor.angle_min, rig.sensor.increment) / sim.clock.dt
+                decision["w"] = (
+                    _nearest_bearing(sim.ranges[i], rig.sensor.angle_min, rig.sensor.increment) / sim.clock.dt
+                )
             dx, dy = update_odometry(sim.percepts[i], shared[i])
             update_tracks(sim.percepts[i], shared[i], rig, dx, dy)
             guard(sim.ranges[i], sim.percepts[i], shared[i], decision, near, rig)

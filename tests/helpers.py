@@ -13,7 +13,9 @@ from swarmscope.sim.lidar import cast_static, make_beams
 from swarmscope.sim.state import Clock, Noise, Radio, new_sim
 from swarmscope.sim.world import Circle, WorldSpec, compile_world
 
-settings.register_profile("kernels", deadline=None, derandomize=True)  # the first call of a kernel compiles it
+settings.register_profile(
+    "kernels", deadline=None, derandomize=True
+)  # the first call of a kernel compiles it
 settings.load_profile("kernels")
 
 DT = 0.2

@@ -15,7 +15,9 @@ from swarmscope.sim.cells import index_robots
 from swarmscope.sim.sensing import sense
 from swarmscope.sim.state import Noise
 
-NOISE = Noise(range_sigma=0.02, dropout=0.05, position_range_sigma=0.02, bearing_sigma=0.02, compass_sigma=0.05)
+NOISE = Noise(
+    range_sigma=0.02, dropout=0.05, position_range_sigma=0.02, bearing_sigma=0.02, compass_sigma=0.05
+)
 
 
 def sensed(starts, tick=3, **options):
@@ -73,7 +75,10 @@ def test_nobody_is_seen_beyond_the_lidars_range_or_outside_its_field_of_view():
 def test_no_more_than_the_table_holds_and_those_are_the_nearest():
     angles = np.linspace(-3.0, 3.0, MAX_NEIGHBOURS + 4)
     radii = 2.0 + 0.1 * np.random.default_rng(0).permutation(angles.size)
-    starts = [(0.0, 0.0, 0.0), *((r * math.cos(a), r * math.sin(a), 0.0) for r, a in zip(radii, angles, strict=True))]
+    starts = [
+        (0.0, 0.0, 0.0),
+        *((r * math.cos(a), r * math.sin(a), 0.0) for r, a in zip(radii, angles, strict=True)),
+    ]
     ids, _ = neighbours(sensed(starts), 0)
     assert ids == (1 + np.argsort(radii)[:MAX_NEIGHBOURS]).tolist()
 
@@ -98,10 +103,14 @@ def test_odometry_is_the_motion_since_the_last_tick_in_the_old_body_frame():
     sim, _, _ = place_sim([(1.0, 2.0, 0.5 * math.pi)])
     index_robots(sim)
     sense(sim, 0, 0, 1)
-    assert [float(sim.percepts[0][k]) for k in ("odom_x", "odom_y", "odom_yaw")] == pytest.approx([0.0, 0.0, 0.0])
+    assert [float(sim.percepts[0][k]) for k in ("odom_x", "odom_y", "odom_yaw")] == pytest.approx(
+        [0.0, 0.0, 0.0]
+    )
     sim.robots["x"], sim.robots["y"], sim.robots["yaw"] = 0.7, 2.4, 0.5 * math.pi + 0.1
     sense(sim, 1, 0, 1)
-    assert [float(sim.percepts[0][k]) for k in ("odom_x", "odom_y", "odom_yaw")] == pytest.approx([0.4, 0.3, 0.1])
+    assert [float(sim.percepts[0][k]) for k in ("odom_x", "odom_y", "odom_yaw")] == pytest.approx(
+        [0.4, 0.3, 0.1]
+    )
     sense(sim, 2, 0, 1)
     assert float(sim.percepts[0]["odom_x"]) == pytest.approx(0.0)
 
@@ -161,7 +170,9 @@ def test_noise_has_the_size_that_is_asked_for():
         sense(sim, tick, 0, 1)
         (_, places) = neighbours(sim, 0)
         x, y = places[0]
-        rows.append((sim.ranges[0, 180], math.hypot(x, y), math.atan2(y, x), float(sim.percepts[0]["compass"])))
+        rows.append(
+            (sim.ranges[0, 180], math.hypot(x, y), math.atan2(y, x), float(sim.percepts[0]["compass"]))
+        )
     rows = np.array(rows)
     assert rows.mean(axis=0) == pytest.approx([1.85, 2.0, 0.0, 0.0], abs=0.01)
     assert rows.std(axis=0) == pytest.approx([0.02 * 1.85, 0.06, 0.04, 0.05], rel=0.08)

@@ -56,7 +56,9 @@ def test_every_part_of_the_key_counts(seed, robot, tick):
 
 
 def test_keys_of_a_run_do_not_collide():
-    keys = {key(0, robot, tick, purpose) for robot in range(20) for tick in range(50) for purpose in range(1, 7)}
+    keys = {
+        key(0, robot, tick, purpose) for robot in range(20) for tick in range(50) for purpose in range(1, 7)
+    }
     assert len(keys) == 20 * 50 * 6
 
 

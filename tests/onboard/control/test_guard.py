@@ -198,7 +198,9 @@ def test_adversarial_commands_never_touch_obstacles(name):
     for run in range(40):
         rows = np.column_stack([rng.uniform(-3, 3, (30, 2)), rng.uniform(0.05, 0.4, 30)])
         rows = rows[np.hypot(rows[:, 0], rows[:, 1]) - rows[:, 2] > body.radius + rig.clearance]
-        sim, shared, _ = place_sim([(0.0, 0.0, rng.uniform(-3, 3))], world=circles_world(rows), rig=rig, seed=run)
+        sim, shared, _ = place_sim(
+            [(0.0, 0.0, rng.uniform(-3, 3))], world=circles_world(rows), rig=rig, seed=run
+        )
         smallest = min(smallest, closest(sim, shared, rig, 200, run % 3))
     assert smallest > 0.0
     assert smallest < 0.05  # otherwise the adversary was too tame to show anything

@@ -37,7 +37,9 @@ def test_area_under_the_linear_reconstruction_by_numeric_integration(pairs, span
     middle = lower + (np.arange(steps) + 0.5) * (upper - lower) / steps
     d = np.array([reconstruct(angles, distances, count, phi % TWO_PI, False) for phi in middle])
     numeric = 0.5 * float((d * d).sum()) * (upper - lower) / steps
-    assert quadrant_area(angles, distances, count, lower, upper, False) == pytest.approx(numeric, rel=2e-3, abs=1e-9)
+    assert quadrant_area(angles, distances, count, lower, upper, False) == pytest.approx(
+        numeric, rel=2e-3, abs=1e-9
+    )
 
 
 @settings(max_examples=60, deadline=None)
@@ -52,7 +54,9 @@ def test_area_of_the_triangles_by_the_shoelace_formula(pairs, span):
     x = np.array([0.0] + [d * math.cos(a) for a, d in corners])
     y = np.array([0.0] + [d * math.sin(a) for a, d in corners])
     shoelace = 0.5 * float((x * np.roll(y, -1) - y * np.roll(x, -1)).sum())
-    assert quadrant_area(angles, distances, count, lower, upper, True) == pytest.approx(shoelace, rel=1e-9, abs=1e-9)
+    assert quadrant_area(angles, distances, count, lower, upper, True) == pytest.approx(
+        shoelace, rel=1e-9, abs=1e-9
+    )
 
 
 @settings(deadline=None)

@@ -94,7 +94,9 @@ def test_a_scan_has_no_more_features_than_a_packet_holds(seed):
     """About 2 pi / alpha maxima and as many minima: the filter leaves at most two extrema per window."""
     rng = np.random.default_rng(seed)
     rig = rig_of()
-    scan = scan_at(circles_world(np.column_stack([rng.uniform(-4, 4, (40, 2)), rng.uniform(0.05, 0.3, 40)])), rig)
+    scan = scan_at(
+        circles_world(np.column_stack([rng.uniform(-4, 4, (40, 2)), rng.uniform(0.05, 0.3, 40)])), rig
+    )
     padded, out = np.zeros(360 + 2 * rig.half, np.float32), np.zeros(360, np.float32)
     prepare_scan(scan, 0.0, RANGE_MAX, True, rig.half, padded)
     filter_padded(padded, rig.taps, RANGE_MAX, out)
@@ -134,7 +136,13 @@ def test_reconstruction_of_none_and_one():
 
 @pytest.mark.parametrize(
     ("phi", "linear"),
-    [(0.5, 1.0), (1.0, 1.5), (1.5, 2.0), (0.0, 1.0 + 0.5 * 1.0 / (TWO_PI - 1.0)), (2.0, 2.0 - 0.5 / (TWO_PI - 1.0))],
+    [
+        (0.5, 1.0),
+        (1.0, 1.5),
+        (1.5, 2.0),
+        (0.0, 1.0 + 0.5 * 1.0 / (TWO_PI - 1.0)),
+        (2.0, 2.0 - 0.5 / (TWO_PI - 1.0)),
+    ],
 )
 def test_reconstruction_is_linear_in_the_angle_and_crosses_the_seam(phi, linear):
     angles, distances = np.array([0.5, 1.5]), np.array([1.0, 2.0])

@@ -55,7 +55,12 @@ def rows_of(now=10.0, **options):
 def read(rows, *packets):
     rows.receive(*packets)
     read_inbox(
-        rows.percept, rows.memory, rows.rig, rows.scratch.header[0], rows.scratch.angles[0, 1], rows.scratch.distances[0, 1]
+        rows.percept,
+        rows.memory,
+        rows.rig,
+        rows.scratch.header[0],
+        rows.scratch.angles[0, 1],
+        rows.scratch.distances[0, 1],
     )
     return rows.shared[0]
 
@@ -74,7 +79,9 @@ def asked(rows, *peers):
 def sent(rows):
     """The outbox as [(to, bytes)]."""
     row = rows.decisions[0]
-    return [(int(row["out_to"][k]), row["out"][k, : row["out_length"][k]].tobytes()) for k in range(row["n_out"])]
+    return [
+        (int(row["out_to"][k]), row["out"][k, : row["out_length"][k]].tobytes()) for k in range(row["n_out"])
+    ]
 
 
 def header_of(packet):
@@ -232,7 +239,9 @@ def test_a_full_outbox_takes_no_more():
     assert row["n_out"] == MAX_OUTBOX
     assert rows.shared["asked_n"][0] == MAX_OUTBOX
     read(rows, *(request(200 + k, 1) for k in range(MAX_INBOX)))
-    answer_all(rows.percept, rows.memory, rows.decision, rows.rig, np.zeros(MAX_FEATURES), np.zeros(MAX_FEATURES), 16)
+    answer_all(
+        rows.percept, rows.memory, rows.decision, rows.rig, np.zeros(MAX_FEATURES), np.zeros(MAX_FEATURES), 16
+    )
     assert rows.decisions[0]["n_out"] == MAX_OUTBOX
 
 
@@ -272,6 +281,12 @@ def test_no_index_leaves_its_table():
     code = "import test_inbox as t; t.test_any_packets_in_any_order_leave_the_tables_whole()"
     here = os.path.dirname(__file__)
     path = os.pathsep.join([here, os.path.join(here, "..", ".."), *sys.path])
-    environment = os.environ | {"NUMBA_DISABLE_JIT": "1", "PYTHONPATH": path, "PYTHONWARNINGS": "error::RuntimeWarning"}
-    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False)
+    environment = os.environ | {
+        "NUMBA_DISABLE_JIT": "1",
+        "PYTHONPATH": path,
+        "PYTHONWARNINGS": "error::RuntimeWarning",
+    }
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stderr[-3000:]

@@ -72,7 +72,11 @@ def test_a_neighbour_at_constant_velocity_is_followed(course, speed, own_speed, 
         watcher.watch({7: (*place, course)}, (x, y, yaw))
         found, estimate, _ = watcher.track(7)
         assert found == pytest.approx(place, abs=1e-9)
-        x, y, yaw = x + own_speed * DT * math.cos(yaw), y + own_speed * DT * math.sin(yaw), yaw + own_turn * DT
+        x, y, yaw = (
+            x + own_speed * DT * math.cos(yaw),
+            y + own_speed * DT * math.sin(yaw),
+            yaw + own_turn * DT,
+        )
     assert estimate == pytest.approx(velocity, abs=1e-3)
 
 

@@ -1,0 +1,121 @@
+"""The on-board part needs numpy and numba and nothing else; sources keep the kernel rules."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+SRC = Path(__file__).resolve().parents[2] / "src" / "swarmscope"
+BLOCKED = (
+    "scipy",
+    "matplotlib",
+    "pydantic",
+    "typer",
+    "rich",
+    "yaml",
+    "PIL",
+    "swarmscope.sim",
+    "swarmscope.tasks",
+)
+ONBOARD = sorted(SRC.glob("onboard/**/*.py"))
+SOURCES = sorted(SRC.glob("**/*.py"))
+
+
+def module_of(path):
+    parts = path.relative_to(SRC.parent).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def imports_of(path):
+    """The modules that a file imports, anywhere in it."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and not node.level:
+            yield from [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
+
+
+def test_the_on_board_part_imports_without_everything_else():
+    code = f"""
+import importlib, sys
+class Block:
+    def find_spec(self, name, path=None, target=None):
+        if any(name == b or name.startswith(b + ".") for b in {BLOCKED!r}):
+            raise ImportError("blocked: " + name)
+sys.meta_path.insert(0, Block())
+for name in {[module_of(p) for p in ONBOARD]!r}:
+    importlib.import_module(name)
+try:
+    import pydantic
+except ImportError:
+    print("ok")
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[-2000:]
+    assert done.stdout == "ok\n"
+    assert len(ONBOARD) > 15
+
+
+@pytest.mark.parametrize("path", ONBOARD, ids=module_of)
+def test_on_board_modules_import_only_what_a_robot_has(path):
+    allowed = ("numpy", "swarmscope.onboard", "swarmscope._jit", "swarmscope.geometry", "swarmscope.errors")
+    for name in imports_of(path):
+        root = name.split(".")[0]
+        assert name.startswith(allowed) or root in sys.stdlib_module_names, name
+
+
+@pytest.mark.parametrize("path", [p for p in SOURCES if p.name != "_jit.py"], ids=module_of)
+def test_numba_is_configured_in_one_place(path):
+    names = {name.split(".")[0] for name in imports_of(path)}
+    assert not names & {"numba", "llvmlite"} or path.parts[-2:] == ("evaluation", "provenance.py")
+
+
+JITS = {
+    f.name
+    for f in ast.parse((SRC / "_jit.py").read_text(encoding="utf-8")).body
+    if isinstance(f, ast.FunctionDef)
+}
+KERNEL_PARTS = [p for p in SOURCES if p.relative_to(SRC).parts[0] in ("onboard", "sim")]
+
+
+@pytest.mark.parametrize("path", KERNEL_PARTS, ids=module_of)
+def test_robots_and_world_draw_no_unkeyed_random_numbers(path):
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    assert not any(name.split(".")[0] in ("random", "secrets") for name in imports_of(path))
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Attribute) and node.attr == "random":
+            assert not (isinstance(node.value, ast.Name) and node.value.id in ("np", "numpy")), node.lineno
+
+
+def decorated(path):
+    """(function, decorator names) of every function at the top of a file."""
+    for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.FunctionDef):
+            yield node, [d.id if isinstance(d, ast.Name) else ast.unparse(d) for d in node.decorator_list]
+
+
+@pytest.mark.parametrize("path", KERNEL_PARTS, ids=module_of)
+def test_kernels_are_decorated_plainly_and_neither_print_nor_raise(path):
+    for function, decorators in decorated(path):
+        if not JITS & set(decorators):
+            assert not any("jit" in d or "vectorize" in d for d in decorators), (function.name, decorators)
+            continue
+        assert len(decorators) == 1, function.name
+        for node in ast.walk(function):
+            assert not isinstance(node, (ast.Raise, ast.Try, ast.Assert, ast.With)), (
+                function.name,
+                node.lineno,
+            )
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+                assert node.func.id not in ("print", "open", "eval", "exec"), (function.name, node.lineno)
+
+
+def test_the_source_tree_is_read_at_all():
+    kernels = [f.name for p in KERNEL_PARTS for f, d in decorated(p) if "jit" in d]
+    assert {"jit", "jit_inline"} <= JITS
+    assert len(kernels) > 40
+    assert {"guard", "safe_directions", "sense", "move"} <= set(kernels)
