@@ -1,6 +1,6 @@
 """The folder of one run: complete, or not there at all.
 
-Everything is written and synced in a sibling folder, ``metrics.json`` last, and then renamed into place.
+Everything is written and synced in a hidden sibling folder, and then renamed into place.
 A process killed at any moment leaves the earlier result or the new one, and at worst a hidden sibling,
 which the next write to the same place removes.
 """
@@ -136,15 +136,14 @@ def _write_all(
     (folder / CONFIG).write_text(_yaml_text(config), encoding="utf-8")
     (folder / WORLD).write_text(_json_text(world), encoding="utf-8")
     _write_npz(folder / TRAJECTORY, trajectory)
+    (folder / METRICS).write_text(_json_text(metrics), encoding="utf-8")
     if extras is not None:
-        extras(folder)
+        extras(folder)  # pictures of a run whose data are complete; the folder itself is not in place yet
     names = {entry.name for entry in folder.iterdir()}
-    if not names <= RUN_FILES - {METRICS}:
+    if not names <= RUN_FILES:
         raise ValueError(f"extras wrote {sorted(names - RUN_FILES)}; a run folder holds {sorted(RUN_FILES)}")
     for name in names:
         _sync(folder / name)
-    (folder / METRICS).write_text(_json_text(metrics), encoding="utf-8")
-    _sync(folder / METRICS)
     _sync(folder)
 
 

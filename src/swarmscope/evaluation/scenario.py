@@ -16,7 +16,7 @@ from swarmscope.onboard.planning._contract import load_planner, make_params, pla
 from swarmscope.onboard.robot import Body
 from swarmscope.sim.lidar import make_beams
 from swarmscope.sim.loop import Setting
-from swarmscope.sim.maps import load_map
+from swarmscope.sim.maps import load_map, packaged_map
 from swarmscope.sim.state import Noise, Radio
 from swarmscope.sim.world import WorldSpec, compile_world
 from swarmscope.tasks._contract import Setup, load_task, task_names
@@ -162,19 +162,33 @@ def parse_scenario(values: Any, where: str) -> Scenario:
     return scenario
 
 
-def load_scenario(path: Path) -> Scenario:
-    """Return the scenario in YAML file ``path``; a map file is looked for beside it."""
+def read_scenario_file(path: Path) -> dict[str, Any]:
+    """Return the mapping in YAML file ``path``, not validated yet; a map file is looked for beside it."""
     try:
         values = yaml.safe_load(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         raise InputFileError(path, f"cannot be read ({error})") from None
     except yaml.YAMLError as error:
         raise InputFileError(path, f"is not YAML ({str(error).splitlines()[0]})") from None
-    if isinstance(values, dict) and isinstance(values.get("map"), dict) and isinstance(values["map"].get("file"), str):
-        beside = path.parent / values["map"]["file"]
-        if beside.exists():
-            values["map"]["file"] = str(beside)
-    return parse_scenario(values, str(path))
+    if not isinstance(values, dict):
+        raise ConfigError(str(path), "a scenario is a mapping of keys to values")
+    place = values.get("map")
+    if isinstance(place, dict) and isinstance(place.get("file"), str):
+        place["file"] = _find_map(path, place["file"])
+    return values
+
+
+def _find_map(scenario: Path, name: str) -> str:
+    """Return the map's path: beside the scenario, as it is, or packaged under that name."""
+    if not name.endswith((".yaml", ".yml")):
+        return str(packaged_map(name))
+    beside = scenario.parent / name
+    return str(beside) if beside.exists() else name
+
+
+def load_scenario(path: Path) -> Scenario:
+    """Return the scenario in YAML file ``path``."""
+    return parse_scenario(read_scenario_file(path), str(path))
 
 
 def _first_problem(error: ValidationError, where: str) -> ConfigError:

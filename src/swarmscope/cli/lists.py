@@ -1,0 +1,55 @@
+"""``swarmscope planners`` and ``swarmscope tasks``."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+from types import ModuleType
+
+from rich.console import Console
+from rich.table import Table
+
+from swarmscope.onboard.planning._contract import load_planner, planner_names
+from swarmscope.tasks import load_task, task_names
+
+
+def list_planners() -> None:
+    """Print every planner with what it is given and its parameters."""
+    console = Console()
+    for name in planner_names():
+        module = load_planner(name)
+        console.print(f"[bold]{name}[/bold]  {module.SUMMARY}")
+        console.print(f"  is given: {module.NEEDS}", highlight=False)
+        table = Table("parameter", "default", "meaning")
+        for field, default in module.Params._field_defaults.items():
+            table.add_row(field, str(default), field_docs(module, "Params").get(field, ""))
+        console.print(table)
+
+
+def list_tasks() -> None:
+    """Print every task in one line."""
+    table = Table("task", "what it is")
+    for name in task_names():
+        table.add_row(name, load_task(name).SUMMARY)
+    Console().print(table)
+
+
+def field_docs(module: ModuleType, class_name: str) -> dict[str, str]:
+    """Return the text that follows each field of a class in its module's source."""
+    for node in ast.parse(inspect.getsource(module)).body:
+        if isinstance(node, ast.ClassDef) and node.name == class_name:
+            return _texts_after_fields(node)
+    return {}
+
+
+def _texts_after_fields(node: ast.ClassDef) -> dict[str, str]:
+    docs = {}
+    for field, text in zip(node.body[:-1], node.body[1:], strict=True):
+        if (
+            isinstance(field, ast.AnnAssign)
+            and isinstance(field.target, ast.Name)
+            and isinstance(text, ast.Expr)
+            and isinstance(text.value, ast.Constant)
+        ):
+            docs[field.target.id] = " ".join(str(text.value.value).split())
+    return docs

@@ -1,0 +1,128 @@
+"""The ``swarmscope`` command. Heavy imports happen inside the commands, so that ``--help`` answers at once."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from swarmscope import __version__
+from swarmscope.errors import SwarmscopeError
+
+app = typer.Typer(
+    add_completion=False,
+    no_args_is_help=True,
+    rich_markup_mode="rich",
+    pretty_exceptions_enable=False,
+    help="Robots that share what they see: run swarms of planners in unknown places, look at them, measure them.",
+    epilog="Example: [bold]swarmscope run --task T1 --robots 15 --seed 0[/bold]",
+)
+
+
+def _version(value: bool) -> None:
+    if value:
+        typer.echo(f"swarmscope {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def common(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
+) -> None:
+    """Options of every command."""
+
+
+@app.command(
+    epilog="Examples: [bold]swarmscope run --task T3 --seed 4 --set planner.params.w_i=0[/bold] · "
+    "[bold]swarmscope run examples/noisy_radio.yaml[/bold] · "
+    "[bold]swarmscope run --map willow_garage_office --robots 5[/bold]"
+)
+def run(
+    scenario: Annotated[Path | None, typer.Argument(help="Scenario file (YAML); options override it.")] = None,
+    task: Annotated[str | None, typer.Option(help="Task by name (see 'swarmscope tasks').")] = None,
+    map_: Annotated[
+        str | None, typer.Option("--map", help="map_server YAML of a real building, or the name of a packaged one.")
+    ] = None,
+    planner: Annotated[str | None, typer.Option(help="Planner by name (see 'swarmscope planners').")] = None,
+    robots: Annotated[int | None, typer.Option(help="Number of robots.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of world and noise.")] = None,
+    limit: Annotated[float | None, typer.Option(help="Time limit, simulated seconds.")] = None,
+    set_: Annotated[
+        list[str] | None, typer.Option("--set", help="Any key of a scenario, as key.path=value; repeatable.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Run folder; default runs/<task>-<planner>-<seed>.")] = None,
+    threads: Annotated[int, typer.Option(min=1, help="Threads; the result is the same with any number.")] = 1,
+    pictures: Annotated[bool, typer.Option(help="Make paths.png and replay.html.")] = True,
+) -> None:
+    """Run one scenario to a folder: metrics, trajectory, world, a picture, a replay page."""
+    from swarmscope.cli.run import run_command
+
+    options = {"robots": robots, "seed": seed, "limit_s": limit}
+    run_command(scenario, task, map_, planner, options, set_ or [], out, threads, pictures)
+
+
+@app.command(
+    epilog="Example: [bold]swarmscope perceive malaga_telecom_2006_sick_lms --out runs/perceive[/bold]"
+)
+def perceive(
+    scans: Annotated[str, typer.Argument(help="Scan file (.npz or .csv), or the name of a packaged one.")],
+    out: Annotated[Path | None, typer.Option(help="Folder for features.csv and perceive.png.")] = None,
+    range_m: Annotated[float, typer.Option("--range", help="Range that the robots use [m].")] = 5.0,
+    radius_m: Annotated[float, typer.Option("--radius", help="The robot's radius [m].")] = 0.15,
+) -> None:
+    """Safe directions and features of recorded scans, with the time that they take."""
+    from swarmscope.cli.perceive import perceive_command
+
+    perceive_command(scans, out, range_m, radius_m)
+
+
+@app.command(epilog="Example: [bold]swarmscope replay runs/first --open[/bold]")
+def replay(
+    run_dir: Annotated[Path, typer.Argument(help="A run folder.")],
+    open_: Annotated[bool, typer.Option("--open", help="Open the page in the browser.")] = False,
+) -> None:
+    """Make the replay page and the picture of a run folder anew."""
+    from swarmscope.viewing.pictures import write_picture
+    from swarmscope.viewing.replay import write_replay
+
+    page = write_replay(run_dir)
+    typer.echo(str(write_picture(run_dir)))
+    typer.echo(str(page))
+    if open_:
+        typer.launch(page.resolve().as_uri())
+
+
+@app.command(epilog="Example: [bold]swarmscope planners[/bold]")
+def planners() -> None:
+    """List the planners, what each is given, and its parameters."""
+    from swarmscope.cli.lists import list_planners
+
+    list_planners()
+
+
+@app.command(epilog="Example: [bold]swarmscope tasks[/bold]")
+def tasks() -> None:
+    """List the tasks."""
+    from swarmscope.cli.lists import list_tasks
+
+    list_tasks()
+
+
+def main() -> None:
+    """Run the command line; errors that a user can cause are two plain lines, not a traceback."""
+    try:
+        app()
+    except SwarmscopeError as error:
+        print(f"swarmscope: {error}", file=sys.stderr)
+        sys.exit(2)
+    except KeyboardInterrupt:
+        print("swarmscope: stopped; nothing of the unfinished run was kept", file=sys.stderr)
+        sys.exit(130)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(0)

@@ -1,0 +1,222 @@
+"""From a scenario to its figures and its run folder."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from swarmscope.evaluation.metrics import all_metrics
+from swarmscope.evaluation.provenance import git_revision, versions
+from swarmscope.evaluation.run_folder import check_out, write_run
+from swarmscope.evaluation.scenario import Scenario, make_setting, make_setup
+from swarmscope.evaluation.shortest_path import any_angle_paths, grid_paths, lengths_m
+from swarmscope.onboard.planning._contract import REASON_NAMES, STATE_NAMES
+from swarmscope.sim.loop import Setting, Trace, run
+from swarmscope.tasks import Setup
+
+ANY_ANGLE_ROBOTS = 50
+"""With more robots the any-angle reference, which takes longer than the run, is left out."""
+KM = 1000.0
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A finished run with its references."""
+
+    scenario: Scenario
+    setup: Setup
+    setting: Setting
+    trace: Trace
+    shortest_m: np.ndarray
+    any_angle_m: np.ndarray
+
+
+def play(
+    scenario: Scenario,
+    threads: int = 1,
+    progress: Callable[[float, int], None] | None = None,
+    any_angle: bool = True,
+) -> Outcome:
+    """Run the scenario and find the reference paths; ``progress(simulated seconds, robots done)``."""
+    setup = make_setup(scenario)
+    setting = make_setting(scenario, setup, threads)
+    trace = run(setting, progress)
+    radius = scenario.robot.radius_m
+    shortest = lengths_m(grid_paths(setup.world, setup.starts, setup.goals, radius))
+    best = np.full(len(shortest), np.nan)
+    if any_angle and scenario.robots <= ANY_ANGLE_ROBOTS:
+        best = lengths_m(any_angle_paths(setup.world, setup.starts, setup.goals, radius))
+    return Outcome(scenario, setup, setting, trace, shortest, best)
+
+
+def run_scenario(
+    scenario: Scenario,
+    out: Path,
+    threads: int = 1,
+    progress: Callable[[float, int], None] | None = None,
+    extras: Callable[[Path], None] | None = None,
+) -> dict[str, Any]:
+    """Run the scenario into the run folder ``out`` and return its metrics; ``extras`` adds pictures to it."""
+    check_out(out)
+    outcome = play(scenario, threads, progress)
+    metrics = figures(outcome)
+    write_run(out, dump_scenario(scenario), world_table(outcome), trajectory(outcome), metrics, extras)
+    return metrics
+
+
+def dump_scenario(scenario: Scenario) -> dict[str, Any]:
+    """Return the complete scenario, every default written out, ready to be run again."""
+    values = scenario.model_dump(mode="json", exclude_none=True)
+    if scenario.map is not None:
+        values["map"]["file"] = str(Path(scenario.map.file).resolve())
+    return values
+
+
+def figures(outcome: Outcome) -> dict[str, Any]:
+    """Return everything that goes into ``metrics.json``; only ``plan_us_*`` and ``measured`` are wall-clock."""
+    robots, trace, scenario = outcome.trace.robots, outcome.trace, outcome.scenario
+    t_s, x, y = _with_end(outcome)
+    records = trace.records
+    values: dict[str, Any] = dict(
+        all_metrics(
+            t_s,
+            x,
+            y,
+            _pad(records.speed),
+            _pad(records.bytes_sent),
+            robots["arrival_s"],
+            robots["crashed"],
+            outcome.shortest_m,
+        )
+    )
+    arrived = np.isfinite(robots["arrival_s"]) & np.isfinite(outcome.any_angle_m)
+    if arrived.any():
+        values["path_stretch_any_angle"] = float(
+            robots["length"][arrived].sum() / outcome.any_angle_m[arrived].sum()
+        )
+    simulated = len(trace.t_s) * outcome.setting.dt
+    features = int(robots["sent_features"].sum())
+    values |= {
+        "collisions": int(robots["crashed"].sum()),
+        "min_clearance_m": float(robots["min_clearance"].min()),
+        "fusions": int(robots["fusions"].sum()),
+        "messages": int(robots["sent"].sum()),
+        "requests": int(robots["sent"].sum()) - features,
+        "bytes_sent": int(robots["bytes"].sum()),
+        "bytes_on_air": int(robots["air_bytes"].sum()),
+        "mean_package_bytes": float(robots["feature_bytes"].sum() / features) if features else None,
+        "bandwidth_kbps": float(8.0 * robots["bytes"].sum() / simulated / KM),
+        "packets_lost": int(robots["lost"].sum()),
+        "packets_out_of_range": int(robots["unreachable"].sum()),
+        "packets_crowded_out": int(robots["crowded"].sum()),
+        "packets_dropped_bad": int(trace.shared["dropped_bad"].sum()),
+        "packets_dropped_stale": int(trace.shared["dropped_stale"].sum()),
+        "planner_memory_bytes": trace.memory_bytes,
+        "simulated_s": simulated,
+        "failures": failures(outcome),
+        "run": {
+            "task": place_name(scenario),
+            "planner": scenario.planner.name,
+            "robots": scenario.robots,
+            "seed": scenario.seed,
+        },
+        "config_sha256": hashlib.sha256(
+            json.dumps(dump_scenario(scenario), sort_keys=True).encode()
+        ).hexdigest(),
+        "versions": versions(),
+        "git_revision": git_revision(),
+        "plan_us_p50": _percentile(trace.plan_us, 50),
+        "plan_us_p99": _percentile(trace.plan_us, 99),
+        "measured": {"run_wall_s": trace.wall_s, "real_time_factor": simulated / trace.wall_s},
+    }
+    return values
+
+
+def place_name(scenario: Scenario) -> str:
+    """Return what the scenario is run in, for titles."""
+    if scenario.task is not None:
+        return scenario.task.name
+    return Path(scenario.map.file).stem if scenario.map is not None else "place"
+
+
+def failures(outcome: Outcome) -> list[dict[str, Any]]:
+    """Name each robot that did not arrive, and why."""
+    robots, records = outcome.trace.robots, outcome.trace.records
+    found = []
+    for i in np.flatnonzero(~np.isfinite(robots["arrival_s"])):
+        state, reason = STATE_NAMES[records.state[-1, i]], REASON_NAMES[records.reason[-1, i]]
+        why = "collided" if robots["crashed"][i] else f"time limit in state '{state}': {reason}"
+        found.append({"robot": int(i), "why": why})
+    return found
+
+
+def world_table(outcome: Outcome) -> dict[str, Any]:
+    """Return ``world.json``: robots, starts, goals and every obstacle."""
+    spec = outcome.setup.world.model_dump(mode="json")
+    radius = outcome.scenario.robot.radius_m
+    robots = [
+        {"id": i, "radius": radius, "start": start.tolist(), "goal": goal.tolist()}
+        for i, (start, goal) in enumerate(zip(outcome.setup.starts, outcome.setup.goals, strict=True))
+    ]
+    return {"frame": "map, x east, y north, m and rad (REP-103)", "robots": robots, **spec}
+
+
+def trajectory(outcome: Outcome) -> dict[str, np.ndarray]:
+    """Return the arrays of ``trajectory.npz`` (docs/architecture.md)."""
+    trace, rig = outcome.trace, outcome.setting.rig
+    records = trace.records
+    angles = rig.sensor.angle_min + rig.sensor.increment * np.arange(rig.sensor.beams)
+    return {
+        "t_s": trace.t_s,
+        "x_m": records.x,
+        "y_m": records.y,
+        "yaw_rad": records.yaw,
+        "state": records.state,
+        "reason": records.reason,
+        "speed_mps": records.speed,
+        "clearance_m": records.clearance,
+        "p_left": records.p_left,
+        "side": records.side,
+        "bytes_sent": records.bytes_sent,
+        "neighbours": records.neighbours,
+        "state_names": np.array(STATE_NAMES),
+        "reason_names": np.array(REASON_NAMES),
+        "beam_angles": angles,
+        "scan_u8": records.scan,
+        "safe_bits": records.safe,
+        "links": trace.links,
+        "arrival_s": trace.robots["arrival_s"].copy(),
+        "collided": trace.robots["crashed"].copy(),
+        "range_max_m": np.array(rig.sensor.range_max),
+    }
+
+
+def _with_end(outcome: Outcome) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return times and positions with the robots' last positions, and their goals once arrived, at the end."""
+    trace, robots = outcome.trace, outcome.trace.robots
+    arrived = np.isfinite(robots["arrival_s"])
+    end_x = np.where(arrived, outcome.setup.goals[:, 0], robots["x"])
+    end_y = np.where(arrived, outcome.setup.goals[:, 1], robots["y"])
+    x, y = trace.records.x.copy(), trace.records.y.copy()
+    for i in np.flatnonzero(arrived):  # the way left to the goal counts as travelled
+        after = trace.t_s >= robots["arrival_s"][i] - 1e-9
+        x[after, i], y[after, i] = end_x[i], end_y[i]
+    t_s = np.append(trace.t_s, len(trace.t_s) * outcome.setting.dt)
+    return t_s, np.vstack([x, end_x]), np.vstack([y, end_y])
+
+
+def _pad(values: np.ndarray) -> np.ndarray:
+    """Repeat the last row once."""
+    padded: np.ndarray = np.vstack([values, values[-1:]])
+    return padded
+
+
+def _percentile(values: np.ndarray, q: float) -> float | None:
+    """Return a percentile, None without values."""
+    return float(np.percentile(values, q)) if len(values) else None
