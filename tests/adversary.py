@@ -1,4 +1,4 @@
-"""Robots that want to crash and are guarded: the safety claim, put to the test with the simulator's kernels."""
+"""Robots that want to crash and are guarded: the safety claim, tested with the simulator's kernels."""
 
 from __future__ import annotations
 

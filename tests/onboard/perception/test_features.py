@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -45,6 +46,10 @@ def test_a_plateau_counts_once_at_its_middle():
     assert find([1, 2, 3, 3, 3, 2, 1, 1, 1, 1]) == [(3, 3.0), (8, 1.0)]
 
 
+def test_of_two_middles_the_first_counts():
+    assert find([1, 2, 2, 1, 0]) == [(1, 2.0), (4, 0.0)]
+
+
 def test_a_plateau_across_the_seam_counts_once():
     assert find([3, 3, 2, 1, 2, 3]) == [(0, 3.0), (3, 1.0)]
 
@@ -85,7 +90,7 @@ def test_maxima_and_minima_take_turns(values):
     distances = [d for _, d in find(values, room=64)]
     assert len(distances) % 2 == 0
     turns = [b > a for a, b in zip(distances, distances[1:] + distances[:1], strict=True)]
-    assert all(a != b for a, b in zip(turns, turns[1:], strict=False))
+    assert all(a != b for a, b in pairwise(turns))
 
 
 @settings(max_examples=25)

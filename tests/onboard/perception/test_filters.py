@@ -88,7 +88,7 @@ def test_equals_the_circular_convolution_by_fft(ranges, half):
 @settings(max_examples=30)
 @given(scans(360))
 def test_equals_the_printed_linear_convolution_on_the_wrapped_scan(ranges):
-    """(6) as printed, with the transform long enough for 360 beams: 1024 points on the scan wrapped at its ends."""
+    """(6) as printed, the transform long enough for 360 beams: 1024 points on the wrapped scan."""
     half = 30
     taps = feature_filter(half)
     values = plain(ranges)
@@ -98,9 +98,8 @@ def test_equals_the_printed_linear_convolution_on_the_wrapped_scan(ranges):
     assert filtered(ranges, taps) == pytest.approx(linear[2 * half : 2 * half + 360], abs=2e-5)
 
 
-def test_512_points_are_too_few_for_the_printed_form():
-    """Why 1024: 360 beams, 60 wrapped ones and 60 of the filter's tail fit into 512, a zero-padded pair does not
-    reach the beams across the seam."""
+def test_512_points_without_wrapping_are_wrong_at_the_seam():
+    """Zero padding alone does not reach the beams across the seam: the scan has to be wrapped first."""
     values = np.full(360, 5.0)
     values[:3] = 1.0
     taps = feature_filter(30).astype(float)

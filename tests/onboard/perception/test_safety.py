@@ -49,7 +49,7 @@ def safe_of(ranges, reach, wraps=True, range_min=0.0, range_max=RANGE_MAX):
 
 
 def windows(ranges, half, wraps, outside):
-    """Every beam's window of 2 half + 1 beams (M, 2 half + 1); ``outside`` beyond the ends unless it wraps."""
+    """Every beam's window of 2 half + 1 beams (M, 2 half + 1); ``outside`` beyond the ends."""
     mode = {"mode": "wrap"} if wraps else {"mode": "constant", "constant_values": outside}
     return np.lib.stride_tricks.sliding_window_view(np.pad(ranges, half, **mode), 2 * half + 1)
 
@@ -69,7 +69,7 @@ def test_the_sector_rule_in_a_limited_field_of_view(ranges):
 
 @given(scans(360))
 def test_the_sector_rule_is_the_printed_filter(ranges):
-    """(5): y_1 = h_1 * min(s, l_th) >= l_th, by FFT; the tolerance is far below one beam's smallest shortfall."""
+    """(5): y_1 = h_1 * min(s, l_th) >= l_th, by FFT; the tolerance is far below one beam's shortfall."""
     near = (ranges >= L_TH - BIN) & (ranges < ROUNDED_L_TH)
     cut = np.minimum(np.where(near, ROUNDED_L_TH, ranges).astype(float), L_TH)
     kernel = np.zeros(360)
@@ -109,9 +109,26 @@ def test_a_disc_that_leaves_in_a_safe_direction_touches_no_return(ranges, name):
             assert (kept >= np.minimum(radius, s) - 1e-6).all()
 
 
+@pytest.mark.parametrize("name", sorted(RULES))
+def test_a_single_return_is_passed_no_closer_than_promised(name):
+    """With beams of 0.1 degrees and ranges at the near end of their bins, where rounding hides nothing."""
+    rule, promises = RULES[name]
+    beams, increment = 3600, math.radians(0.1)
+    reach = reach_table(increment, RANGE_MAX, *rule)
+    for s in np.arange(1, 320, 7) * BIN + 1e-5:
+        ranges = np.full(beams, math.inf, np.float32)
+        ranges[1800] = s
+        off = increment * np.abs(np.flatnonzero(safe_of(ranges, reach)) - 1800)
+        if not off.size:
+            continue
+        for radius, until in promises:
+            passed = s * math.sin(min(off.min(), 0.5 * math.pi))
+            assert s >= until or passed >= min(radius, s) - 1e-6
+
+
 @given(st.floats(0.01, 4.9), st.floats(-math.pi, math.pi))
 def test_no_more_is_blocked_than_the_rule_says(s, bearing):
-    """A single return: directions beyond its half angle, and the rounding of one bin and one beam, stay safe."""
+    """Directions beyond a return's half angle, and the rounding of one bin and one beam, stay safe."""
     rule = RULES["directions"][0]
     ranges = np.full(360, math.inf, np.float32)
     beam = beam_of(bearing, -math.pi, INCREMENT, 360, True)

@@ -126,7 +126,7 @@ def test_the_mirrored_scene_has_the_opposite_own_probability(pairs, bias):
 
 
 def decide(pairs, neighbours, goal_bearing=0.0, compass=0.0, mirror=False, w_i=1.0, bias=0.0):
-    """Robot 0 with features ``pairs`` and neighbours (distance, bearing, features), all in the compass frame."""
+    """Robot 0 with features ``pairs``, neighbours (distance, bearing, features), in the compass frame."""
     rows = Rows(rig_of())
     sign = -1.0 if mirror else 1.0
     rows.percepts["compass"], rows.percepts["goal_bearing"] = sign * compass, sign * goal_bearing
