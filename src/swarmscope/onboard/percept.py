@@ -149,7 +149,7 @@ class Rig(NamedTuple):
     look_ahead: float
     """Directions are free of obstacles up to here [m]."""
     reach: np.ndarray
-    """(3, BINS + 1) int16: what a return blocks, for the safe directions, the narrow gaps and the escape."""
+    """(3, BINS + 2) int16: what a return blocks, for the safe directions, the narrow gaps and the escape."""
     cos: np.ndarray
     sin: np.ndarray
     taps: np.ndarray

@@ -6,6 +6,7 @@ import math
 
 from swarmscope._jit import jit, jit_inner
 from swarmscope.geometry import point_segment_distance, wrap_angle
+from swarmscope.onboard.control.unicycle import ramp
 from swarmscope.onboard.planning._contract import ARRIVED
 from swarmscope.sim.cells import column_of, row_of
 from swarmscope.sim.contact import static_clearance
@@ -29,10 +30,11 @@ def _drive(sim: Sim, i: int) -> None:
     robot, decision, path = sim.robots[i], sim.decisions[i], sim.path[i]
     steps = sim.clock.substeps
     h = sim.clock.dt / steps
-    v_wanted = min(sim.v_max, max(0.0, decision["v"]))
-    w = min(sim.w_max, max(-sim.w_max, decision["w"]))
+    v_wanted, w = decision["v"], decision["w"]
     if robot["crashed"] or not (math.isfinite(v_wanted) and math.isfinite(w)):
         v_wanted, w = 0.0, 0.0
+    v_wanted = min(sim.v_max, max(0.0, v_wanted))
+    w = min(sim.w_max, max(-sim.w_max, w))
     x, y, yaw, v = robot["x"], robot["y"], robot["yaw"], robot["v"]
     if robot["crashed"]:
         v = 0.0
@@ -46,9 +48,7 @@ def _drive(sim: Sim, i: int) -> None:
     c, s = math.cos(yaw + turn), math.sin(yaw + turn)
     ct, st = math.cos(w * h), math.sin(w * h)
     for k in range(1, steps + 1):
-        change = min(sim.a_max * h, max(-sim.a_max * h, v_wanted - v))
-        way = (v + 0.5 * change) * h
-        v += change
+        v, way = ramp(v, v_wanted, sim.a_max, h)
         x += way * c
         y += way * s
         c, s = c * ct - s * st, s * ct + c * st

@@ -13,9 +13,9 @@ import math
 
 import numpy as np
 
-from swarmscope._jit import jit, jit_inner
+from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.geometry import point_segment_distance
-from swarmscope.onboard.control.unicycle import steer
+from swarmscope.onboard.control.unicycle import ramp, steer
 from swarmscope.onboard.percept import PEERS, Rig
 from swarmscope.onboard.sharing.tracks import neighbour_reach
 
@@ -35,14 +35,16 @@ def guard(
     """
     body = rig.body
     v0 = percept["speed"]
-    w = min(body.w_max, max(-body.w_max, decision["w"]))
-    wanted = min(body.v_max, max(0.0, decision["v"]))
+    wanted, w = decision["v"], decision["w"]
     if not (math.isfinite(wanted) and math.isfinite(w)):
         wanted, w = 0.0, 0.0
-    count = _near_beams(ranges, percept["dt_s"], rig, near)
+    w = min(body.w_max, max(-body.w_max, w))
+    wanted = min(body.v_max, max(0.0, wanted))
+    count, nearest = _near_beams(ranges, percept["dt_s"], rig, near)
+    need = min(body.radius + rig.clearance, nearest - 1e-6)  # already too close: never closer
     for fraction in FRACTIONS:
         v = wanted * fraction
-        if _passes(ranges, percept, shared, v0, v, w, near, count, rig):
+        if _passes(ranges, percept, shared, v0, v, w, near, count, need, rig):
             decision["v"], decision["w"] = v, w
             return fraction < 1.0
     decision["v"], decision["w"] = 0.0, 0.0 if v0 > 1e-6 else w
@@ -50,17 +52,30 @@ def guard(
 
 
 @jit_inner
-def _near_beams(ranges: np.ndarray, dt: float, rig: Rig, near: np.ndarray) -> int:
-    """Collect the beams that could matter within this tick's motion and the braking after it; return how many."""
+def _near_beams(ranges: np.ndarray, dt: float, rig: Rig, near: np.ndarray) -> tuple[int, float]:
+    """Collect the beams that could matter within this tick's motion and the braking after it.
+
+    Return how many, and the smallest valid range among them [m].
+    """
     body = rig.body
     reach = body.v_max * (dt + rig.latency) + 2.0 * body.v_max * body.v_max / body.a_max
     limit = body.radius + 2.0 * rig.clearance + reach
+    least = least_range(rig)
     count = 0
+    nearest = math.inf
     for n in range(rig.sensor.beams):
         if not ranges[n] >= limit:
             near[count] = n
             count += 1
-    return count
+            if least <= ranges[n] < nearest:
+                nearest = ranges[n]
+    return count, nearest
+
+
+@jit_inline
+def least_range(rig: Rig) -> float:
+    """Return the smallest range that can be a return of something else: others are invalid, or inside the body."""
+    return max(rig.sensor.range_min, 0.5 * rig.body.radius)
 
 
 @jit_inner
@@ -73,6 +88,7 @@ def _passes(
     w: float,
     near: np.ndarray,
     count: int,
+    need: float,
     rig: Rig,
 ) -> bool:
     """Tell whether commanding (v, w) from speed ``v0`` keeps clear of every near beam and every neighbour."""
@@ -85,9 +101,7 @@ def _passes(
     x1, y1, x2, y2, x3, y3, x4, y4 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     x, y = x0, y0
     for k in range(STEPS):
-        change = min(body.a_max * step, max(-body.a_max * step, v - speed))
-        way = (speed + 0.5 * change) * step
-        speed += change
+        speed, way = ramp(speed, v, body.a_max, step)
         x += way * math.cos(yaw + 0.5 * w * step)
         y += way * math.sin(yaw + 0.5 * w * step)
         yaw += w * step
@@ -108,15 +122,12 @@ def _passes(
     for k in range(count):
         n = near[k]
         s = ranges[n]
-        if not s >= max(rig.sensor.range_min, 0.5 * body.radius):  # invalid, or inside the body: forbid that way
+        if not s >= least_range(rig):  # forbid that way
             s = body.radius + rig.clearance
         px, py = s * rig.cos[n], s * rig.sin[n]
         gap = _point_gap(percept, shared, px, py, rig)
         if gap and not _in_own_half(px, py, s, x4, y4, x5, y5, brake, rig):
             return False
-        need = body.radius + rig.clearance
-        if s < need:  # already too close: never closer
-            need = s - 1e-6
         if (
             point_segment_distance(px, py, 0.0, 0.0, x1, y1) < need
             or point_segment_distance(px, py, x1, y1, x2, y2) < need

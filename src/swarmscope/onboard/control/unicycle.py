@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from swarmscope._jit import jit
+from swarmscope._jit import jit, jit_inline
 from swarmscope.geometry import wrap_angle
 
 FULL_SPEED_WITHIN = math.radians(20.0)
@@ -32,3 +32,12 @@ def arrival_speed(distance: float, v_max: float, a_max: float, dt: float) -> flo
         return 0.0
     reach = a_max * dt
     return min(v_max, math.sqrt(reach * reach + 2.0 * a_max * distance) - reach)
+
+
+@jit_inline
+def ramp(speed: float, wanted: float, a_max: float, dt: float) -> tuple[float, float]:
+    """Return (speed after ``dt`` [m/s], way made [m]) of a speed that goes to ``wanted`` as fast as ``a_max`` lets it."""
+    change = wanted - speed
+    t = min(dt, abs(change) / a_max)
+    after = speed + (t * a_max if change > 0.0 else -t * a_max)
+    return after, 0.5 * (speed + after) * t + after * (dt - t)

@@ -67,7 +67,7 @@ NOT_PLANNERS = frozenset({"fields", "fusion"})
 def load_planner(name: str) -> ModuleType:
     """Return the module of planner ``name``; raises UnknownNameError with the nearest name."""
     file = name.replace("-", "_")
-    if name == file.replace("_", "-") and file not in NOT_PLANNERS and not file.startswith("_"):
+    if file.isidentifier() and name == file.replace("_", "-") and file not in NOT_PLANNERS and file[0] != "_":
         try:
             return _load(file)
         except ModuleNotFoundError as error:

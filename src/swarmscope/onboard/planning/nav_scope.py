@@ -227,7 +227,7 @@ def decide(
     sensor = rig.sensor
     bearing = percept["goal_bearing"]
     speed = arrival_speed(goal - 0.5 * params.arrive_m, rig.body.v_max, rig.body.a_max, percept["dt_s"])
-    final = goal <= rig.protection.l_th + rig.footprint
+    final = goal <= max(rig.protection.l_th + rig.footprint, rig.look_ahead)
     if final:
         free = (
             corridor_length(
