@@ -20,6 +20,8 @@ from swarmscope.evaluation.provenance import git_revision, versions
 from swarmscope.evaluation.runner import figures, play
 from swarmscope.evaluation.scenario import parse_scenario
 from swarmscope.evaluation.statistics import bootstrap_mean, paired_difference, wilson
+from swarmscope.sim.maps import packaged_map
+from swarmscope.tasks import task_names
 
 NOISY = (
     "noise.range_fraction=0.05",
@@ -49,7 +51,11 @@ KEPT = (
 def one(job: tuple[str, int, tuple[str, ...], bool]) -> dict[str, Any]:
     """Run one scenario and return its figures."""
     task, seed, changes, any_angle = job
-    values: dict[str, Any] = {"task": {"name": task}, "seed": seed, "record_scans": "no"}
+    values: dict[str, Any] = {"seed": seed, "record_scans": "no"}
+    if task in task_names():
+        values["task"] = {"name": task}
+    else:
+        values |= {"map": {"file": str(packaged_map(task))}, "robots": 5, "limit_s": 600.0}
     for change in changes:
         set_key(values, change)
     outcome = play(parse_scenario(values, "crossings"), any_angle=any_angle)
@@ -123,7 +129,7 @@ def compare(task: str, ours: list[dict[str, Any]], others: list[dict[str, Any]],
 def main() -> None:
     """Parse the options, run, print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--tasks", nargs="+", default=["T1", "T2", "T3"])
+    parser.add_argument("--tasks", nargs="+", default=["T1", "T2", "T3"], help="tasks, or packaged maps")
     parser.add_argument("--seeds", default="0-99", help="first-last")
     parser.add_argument("--set", dest="changes", action="append", default=[], help="key.path=value, repeatable")
     parser.add_argument("--noise", action="store_true", help=f"the noisy setting: {', '.join(NOISY)}")
