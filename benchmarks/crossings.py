@@ -123,15 +123,20 @@ def compare(task: str, ours: list[dict[str, Any]], others: list[dict[str, Any]],
         both = np.isfinite(first) & np.isfinite(second)
         d = paired_difference(first[both], second[both])
         name = f"{key} [{'%' if unit > 1.0 else 's'}]"
-        print(f"  {task} ours - ({words}): {name:22s} {d.estimate:+.3f} ({d.low:+.3f} to {d.high:+.3f}), p {d.p_value:.3f}")
+        interval = f"{d.estimate:+.3f} ({d.low:+.3f} to {d.high:+.3f}), p {d.p_value:.3f}"
+        print(f"  {task} ours - ({words}): {name:22s} {interval}")
 
 
 def main() -> None:
     """Parse the options, run, print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--tasks", nargs="+", default=["T1", "T2", "T3"], help="tasks, or packaged maps")
     parser.add_argument("--seeds", default="0-99", help="first-last")
-    parser.add_argument("--set", dest="changes", action="append", default=[], help="key.path=value, repeatable")
+    parser.add_argument(
+        "--set", dest="changes", action="append", default=[], help="key.path=value, repeatable"
+    )
     parser.add_argument("--noise", action="store_true", help=f"the noisy setting: {', '.join(NOISY)}")
     parser.add_argument("--against", help="key.path=value of a second set of runs, compared seed by seed")
     parser.add_argument("--any-angle", action="store_true", help="also the true shortest ways (slower)")

@@ -9,6 +9,7 @@ from types import ModuleType
 from rich.console import Console
 from rich.table import Table
 
+from swarmscope.evaluation.scenario import task_options
 from swarmscope.onboard.planning._contract import load_planner, planner_names
 from swarmscope.tasks import load_task, task_names
 
@@ -18,20 +19,23 @@ def list_planners() -> None:
     console = Console()
     for name in planner_names():
         module = load_planner(name)
-        console.print(f"[bold]{name}[/bold]  {module.SUMMARY}")
+        console.print(f"[bold]{name}[/bold]  {module.SUMMARY.removeprefix(f'{name}: ')}")
         console.print(f"  is given: {module.NEEDS}", highlight=False)
-        table = Table("parameter", "default", "meaning")
+        table = Table("planner.params", "default", "meaning")
         for field, default in module.Params._field_defaults.items():
             table.add_row(field, str(default), field_docs(module, "Params").get(field, ""))
         console.print(table)
 
 
 def list_tasks() -> None:
-    """Print every task in one line."""
-    table = Table("task", "what it is")
+    """Print every task with its options."""
+    table = Table("task", "what it is", "task.options and defaults")
     for name in task_names():
-        table.add_row(name, load_task(name).SUMMARY)
+        task = load_task(name)
+        options = " ".join(f"{key}={value:g}" for key, value in task_options(task).items())
+        table.add_row(name, task.SUMMARY, options)
     Console().print(table)
+    print("Example of an option: swarmscope run --task T1 --set task.options.density=0.2")
 
 
 def field_docs(module: ModuleType, class_name: str) -> dict[str, str]:

@@ -1,23 +1,22 @@
-"""The ``swarmscope`` command. Heavy imports happen inside the commands, so that ``--help`` answers at once."""
+"""The ``swarmscope`` command. Heavy imports happen inside the commands: ``--help`` answers at once."""
 
 from __future__ import annotations
 
-import os
-import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from swarmscope import __version__
-from swarmscope.errors import SwarmscopeError
+from swarmscope.cli._errors import PlainErrors
 
 app = typer.Typer(
+    cls=PlainErrors,
     add_completion=False,
     no_args_is_help=True,
     rich_markup_mode="rich",
     pretty_exceptions_enable=False,
-    help="Robots that share what they see: run swarms of planners in unknown places, look at them, measure them.",
+    help="Robots that share what they see: run swarms in unknown places, look at them, measure them.",
     epilog="Example: [bold]swarmscope run --task T1 --robots 15 --seed 0[/bold]",
 )
 
@@ -43,20 +42,25 @@ def common(
     "[bold]swarmscope run --map willow_garage_office --robots 5[/bold]"
 )
 def run(
-    scenario: Annotated[Path | None, typer.Argument(help="Scenario file (YAML); options override it.")] = None,
-    task: Annotated[str | None, typer.Option(help="Task by name (see 'swarmscope tasks').")] = None,
+    scenario: Annotated[
+        Path | None, typer.Argument(help="Scenario file (YAML); options override it.", show_default=False)
+    ] = None,
+    task: Annotated[str | None, typer.Option(help="Task (see 'swarmscope tasks'), else T1.")] = None,
     map_: Annotated[
-        str | None, typer.Option("--map", help="map_server YAML of a real building, or the name of a packaged one.")
+        str | None, typer.Option("--map", help="map_server YAML of a building, or a packaged map by name.")
     ] = None,
-    planner: Annotated[str | None, typer.Option(help="Planner by name (see 'swarmscope planners').")] = None,
-    robots: Annotated[int | None, typer.Option(help="Number of robots.")] = None,
-    seed: Annotated[int | None, typer.Option(help="Seed of world and noise.")] = None,
-    limit: Annotated[float | None, typer.Option(help="Time limit, simulated seconds.")] = None,
+    planner: Annotated[
+        str | None, typer.Option(help="Planner (see 'swarmscope planners'), else nav-scope.")
+    ] = None,
+    robots: Annotated[int | None, typer.Option(help="Number of robots, else 15.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of world and noise, else 0.")] = None,
+    limit: Annotated[float | None, typer.Option(help="Time limit, simulated seconds, else 300.")] = None,
     set_: Annotated[
-        list[str] | None, typer.Option("--set", help="Any key of a scenario, as key.path=value; repeatable.")
+        list[str] | None,
+        typer.Option("--set", metavar="KEY.PATH=VALUE", help="Any key of a scenario; repeatable."),
     ] = None,
-    out: Annotated[Path | None, typer.Option(help="Run folder; default runs/<task>-<planner>-<seed>.")] = None,
-    threads: Annotated[int, typer.Option(min=1, help="Threads; the result is the same with any number.")] = 1,
+    out: Annotated[Path | None, typer.Option(help="Run folder, else runs/<task>-<planner>-<seed>.")] = None,
+    threads: Annotated[int, typer.Option(min=1, max=256, help="Threads; the result is the same.")] = 1,
     pictures: Annotated[bool, typer.Option(help="Make paths.png and replay.html.")] = True,
 ) -> None:
     """Run one scenario to a folder: metrics, trajectory, world, a picture, a replay page."""
@@ -74,11 +78,12 @@ def perceive(
     out: Annotated[Path | None, typer.Option(help="Folder for features.csv and perceive.png.")] = None,
     range_m: Annotated[float, typer.Option("--range", help="Range that the robots use [m].")] = 5.0,
     radius_m: Annotated[float, typer.Option("--radius", help="The robot's radius [m].")] = 0.15,
+    beam_step: Annotated[int, typer.Option(min=1, help="Use every so manieth beam.")] = 1,
 ) -> None:
     """Safe directions and features of recorded scans, with the time that they take."""
     from swarmscope.cli.perceive import perceive_command
 
-    perceive_command(scans, out, range_m, radius_m)
+    perceive_command(scans, out, range_m, radius_m, beam_step)
 
 
 @app.command(epilog="Example: [bold]swarmscope replay runs/first --open[/bold]")
@@ -114,15 +119,5 @@ def tasks() -> None:
 
 
 def main() -> None:
-    """Run the command line; errors that a user can cause are two plain lines, not a traceback."""
-    try:
-        app()
-    except SwarmscopeError as error:
-        print(f"swarmscope: {error}", file=sys.stderr)
-        sys.exit(2)
-    except KeyboardInterrupt:
-        print("swarmscope: stopped; nothing of the unfinished run was kept", file=sys.stderr)
-        sys.exit(130)
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(0)
+    """Run the command line."""
+    app()

@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import yaml
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from swarmscope.errors import ConfigError
+from swarmscope.evaluation.run_folder import check_out
 from swarmscope.evaluation.runner import place_name, run_scenario
 from swarmscope.evaluation.scenario import Scenario, parse_scenario, read_scenario_file
-from swarmscope.sim.maps import packaged_map
 
+PLACES = ("task", "map", "place")
+MOST_FAILURES = 10
 ROWS = (
     ("arrival_rate", "arrived", "{:.1%}"),
     ("collisions", "collisions", "{:.0f}"),
@@ -49,24 +55,37 @@ def run_command(
     """Run what the command line asks for and print what came out."""
     scenario = read_options(file, task, map_, planner, options, changes)
     place = out or Path("runs") / f"{place_name(scenario)}-{scenario.planner.name}-{scenario.seed}"
-    console = Console()
+    check_out(place)
     if kernels_are_cold():
-        console.print("compiling the kernels for the first time (about 40 s, kept on disk) ...")
-    with Progress(
-        TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[note]}"), TimeElapsedColumn()
-    ) as bar:
-        job = bar.add_task(f"{place_name(scenario)} {scenario.planner.name}", total=scenario.limit_s, note="")
-
-        def progress(simulated: float, done: int) -> None:
-            bar.update(job, completed=simulated, note=f"{simulated:.0f} s, {done}/{scenario.robots} robots done")
-
+        print("compiling the kernels for the first time (about 40 s, kept on disk) ...", file=sys.stderr)
+    with progress_bar(scenario) as progress:
         metrics = run_scenario(scenario, place, threads, progress, add_pictures if pictures else None)
-        bar.update(job, completed=scenario.limit_s, note=f"{metrics['simulated_s']:.0f} s simulated")
-    print_metrics(console, metrics)
-    for failure in metrics["failures"]:
-        console.print(f"robot {failure['robot']} did not arrive: {failure['why']}", highlight=False)
+    print_metrics(Console(), metrics)
+    print_failures(metrics["failures"])
     for name in ("paths.png", "replay.html") if pictures else ("metrics.json",):
         print(place / name)
+
+
+@contextmanager
+def progress_bar(scenario: Scenario) -> Iterator[Callable[[float, int], None]]:
+    """Show the simulated time and the robots that are done while the body runs and calls what it is given."""
+    words = TextColumn("{task.fields[note]}")
+    with Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        words,
+        TimeElapsedColumn(),
+        console=Console(stderr=True),
+        transient=True,
+    ) as bar:
+        name = f"{place_name(scenario)} {scenario.planner.name}"
+        job = bar.add_task(name, total=scenario.limit_s, note="")
+
+        def progress(simulated: float, done: int) -> None:
+            note = f"{simulated:.0f} s of {scenario.limit_s:.0f} s, {done} of {scenario.robots} robots done"
+            bar.update(job, completed=simulated, note=note)
+
+        yield progress
 
 
 def add_pictures(folder: Path) -> None:
@@ -87,9 +106,17 @@ def print_metrics(console: Console, metrics: dict[str, Any]) -> None:
     table.add_column(justify="right")
     for key, words, form in ROWS:
         value = metrics.get(key)
-        if value is not None and value == value:
+        if value is not None and np.isfinite(value):
             table.add_row(words, form.format(value))
     console.print(table)
+
+
+def print_failures(failures: list[dict[str, Any]]) -> None:
+    """Print why robots did not arrive; of many only the first."""
+    for failure in failures[:MOST_FAILURES]:
+        print(f"robot {failure['robot']} did not arrive: {failure['why']}")
+    if len(failures) > MOST_FAILURES:
+        print(f"... and {len(failures) - MOST_FAILURES} more robots, all named in metrics.json")
 
 
 def read_options(
@@ -104,28 +131,35 @@ def read_options(
     values: dict[str, Any] = read_scenario_file(file) if file is not None else {}
     if task is not None and map_ is not None:
         raise ConfigError("--task and --map", "give one of them")
-    if task is not None or map_ is not None:
-        for key in ("task", "map", "place"):
-            values.pop(key, None)
     if task is not None:
-        values["task"] = {"name": task}
+        _choose(values, "task", "name", task)
     if map_ is not None:
-        path = map_ if map_.endswith((".yaml", ".yml")) else str(packaged_map(map_))
-        values["map"] = {"file": path}
-    if not any(key in values for key in ("task", "map", "place")):
-        values["task"] = {"name": "T1"}
+        _choose(values, "map", "file", map_)
     if planner is not None:
-        values["planner"] = {"name": planner}
+        _choose(values, "planner", "name", planner)
     values |= {key: value for key, value in options.items() if value is not None}
     for change in changes:
         set_key(values, change)
+    if not any(key in values for key in PLACES):
+        values["task"] = {"name": "T1"}
     return parse_scenario(values, str(file) if file is not None else "command line")
+
+
+def _choose(values: dict[str, Any], group: str, key: str, value: str) -> None:
+    """Set ``group.key``; the group's other keys stay if they were written for the same value."""
+    if group in PLACES:
+        for other in PLACES:
+            if other != group:
+                values.pop(other, None)
+    given = values.get(group)
+    same = isinstance(given, dict) and given.get(key) == value
+    values[group] = given if same else {key: value}
 
 
 def set_key(values: dict[str, Any], change: str) -> None:
     """Apply one ``key.path=value`` to the nested mapping."""
     path, equals, text = change.partition("=")
-    if not equals or not path:
+    if not equals or not all(path.split(".")):
         raise ConfigError(f"--set {change}", "must look like key.path=value")
     at: Any = values
     *parents, last = path.split(".")
@@ -133,16 +167,27 @@ def set_key(values: dict[str, Any], change: str) -> None:
         at = at.setdefault(part, {})
         if not isinstance(at, dict):
             raise ConfigError(f"--set {change}", f"'{part}' is not a group of keys")
+    at[last] = _value(text, change)
+
+
+def _value(text: str, change: str) -> Any:
+    """Return ``text`` as YAML reads it; 1e-3, which YAML 1.1 takes for text, is a number."""
     try:
-        at[last] = yaml.safe_load(text)
+        value = yaml.safe_load(text)
     except yaml.YAMLError:
         raise ConfigError(f"--set {change}", "the value is not valid YAML") from None
+    if isinstance(value, str):
+        with suppress(ValueError):
+            return float(value)
+    return value
 
 
 def kernels_are_cold() -> bool:
-    """Tell whether the compiled kernels of the simulator are not on disk yet."""
-    from swarmscope.sim.loop import world_phase
+    """Tell whether the compiled kernels of the simulator are not on disk yet, or older than their source."""
+    from swarmscope.sim import loop
 
-    cache = getattr(world_phase, "_cache", None)
-    folder = getattr(cache, "cache_path", None)
-    return folder is not None and not any(Path(folder).glob("loop.world_phase-*.nbi"))
+    folder = getattr(getattr(loop.world_phase, "_cache", None), "cache_path", None)
+    if folder is None:
+        return False
+    written = [index.stat().st_mtime for index in Path(folder).glob("loop.world_phase-*.nbi")]
+    return max(written, default=0.0) < Path(loop.__file__).stat().st_mtime

@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from swarmscope.evaluation.metrics import all_metrics
+from swarmscope.evaluation.metrics import all_metrics, path_lengths, path_stretch
 from swarmscope.evaluation.provenance import git_revision, versions
 from swarmscope.evaluation.run_folder import check_out, write_run
-from swarmscope.evaluation.scenario import Scenario, make_setting, make_setup
+from swarmscope.evaluation.scenario import Scenario, complete, make_setting, make_setup
 from swarmscope.evaluation.shortest_path import any_angle_paths, grid_paths, lengths_m
 from swarmscope.onboard.planning._contract import REASON_NAMES, STATE_NAMES
 from swarmscope.sim.loop import Setting, Trace, run
@@ -22,7 +22,9 @@ from swarmscope.tasks import Setup
 
 ANY_ANGLE_ROBOTS = 50
 """With more robots the any-angle reference, which takes longer than the run, is left out."""
-KM = 1000.0
+KILO = 1000.0
+SEARCHED_M2 = 1e6
+"""Sum of (start to goal)^2 over the robots that get an A* reference: some 5 s of search."""
 
 
 @dataclass(frozen=True)
@@ -48,11 +50,22 @@ def play(
     setting = make_setting(scenario, setup, threads)
     trace = run(setting, progress)
     radius = scenario.robot.radius_m
-    shortest = lengths_m(grid_paths(setup.world, setup.starts, setup.goals, radius))
+    shortest = grid_lengths(setup, radius)
     best = np.full(len(shortest), np.nan)
     if any_angle and scenario.robots <= ANY_ANGLE_ROBOTS:
         best = lengths_m(any_angle_paths(setup.world, setup.starts, setup.goals, radius))
     return Outcome(scenario, setup, setting, trace, shortest, best)
+
+
+def grid_lengths(setup: Setup, radius: float) -> np.ndarray:
+    """Return the A* lengths (N,) [m]; of a large swarm only evenly chosen robots have one, the others NaN."""
+    robots = len(setup.starts)
+    apart = setup.goals - setup.starts[:, :2]
+    share = min(1.0, SEARCHED_M2 / max(1.0, float((apart * apart).sum())))
+    chosen = np.unique(np.linspace(0, robots - 1, max(1, int(share * robots))).astype(int))
+    lengths = np.full(robots, np.nan)
+    lengths[chosen] = lengths_m(grid_paths(setup.world, setup.starts[chosen], setup.goals[chosen], radius))
+    return lengths
 
 
 def run_scenario(
@@ -66,20 +79,12 @@ def run_scenario(
     check_out(out)
     outcome = play(scenario, threads, progress)
     metrics = figures(outcome)
-    write_run(out, dump_scenario(scenario), world_table(outcome), trajectory(outcome), metrics, extras)
+    write_run(out, complete(scenario), world_table(outcome), trajectory(outcome), metrics, extras)
     return metrics
 
 
-def dump_scenario(scenario: Scenario) -> dict[str, Any]:
-    """Return the complete scenario, every default written out, ready to be run again."""
-    values = scenario.model_dump(mode="json", exclude_none=True)
-    if scenario.map is not None:
-        values["map"]["file"] = str(Path(scenario.map.file).resolve())
-    return values
-
-
 def figures(outcome: Outcome) -> dict[str, Any]:
-    """Return everything that goes into ``metrics.json``; only ``plan_us_*`` and ``measured`` are wall-clock."""
+    """Return everything that goes into ``metrics.json``; only ``plan_us_*`` and ``measured`` are times."""
     robots, trace, scenario = outcome.trace.robots, outcome.trace, outcome.scenario
     t_s, x, y = _with_end(outcome)
     records = trace.records
@@ -95,14 +100,14 @@ def figures(outcome: Outcome) -> dict[str, Any]:
             outcome.shortest_m,
         )
     )
-    arrived = np.isfinite(robots["arrival_s"]) & np.isfinite(outcome.any_angle_m)
-    if arrived.any():
-        values["path_stretch_any_angle"] = float(
-            robots["length"][arrived].sum() / outcome.any_angle_m[arrived].sum()
-        )
+    stretch = path_stretch(
+        path_lengths(x, y, t_s, robots["arrival_s"]), outcome.any_angle_m, robots["arrival_s"]
+    )
     simulated = len(trace.t_s) * outcome.setting.dt
     features = int(robots["sent_features"].sum())
     values |= {
+        "path_stretch_any_angle": stretch,
+        "reference_robots": int(np.isfinite(outcome.shortest_m).sum()),
         "collisions": int(robots["crashed"].sum()),
         "min_clearance_m": float(robots["min_clearance"].min()),
         "fusions": int(robots["fusions"].sum()),
@@ -111,7 +116,7 @@ def figures(outcome: Outcome) -> dict[str, Any]:
         "bytes_sent": int(robots["bytes"].sum()),
         "bytes_on_air": int(robots["air_bytes"].sum()),
         "mean_package_bytes": float(robots["feature_bytes"].sum() / features) if features else None,
-        "bandwidth_kbps": float(8.0 * robots["bytes"].sum() / simulated / KM),
+        "bandwidth_kbps": float(8.0 * robots["bytes"].sum() / simulated / KILO),
         "packets_lost": int(robots["lost"].sum()),
         "packets_out_of_range": int(robots["unreachable"].sum()),
         "packets_crowded_out": int(robots["crowded"].sum()),
@@ -126,9 +131,7 @@ def figures(outcome: Outcome) -> dict[str, Any]:
             "robots": scenario.robots,
             "seed": scenario.seed,
         },
-        "config_sha256": hashlib.sha256(
-            json.dumps(dump_scenario(scenario), sort_keys=True).encode()
-        ).hexdigest(),
+        "config_sha256": hashlib.sha256(json.dumps(complete(scenario), sort_keys=True).encode()).hexdigest(),
         "versions": versions(),
         "git_revision": git_revision(),
         "plan_us_p50": _percentile(trace.plan_us, 50),
@@ -198,7 +201,7 @@ def trajectory(outcome: Outcome) -> dict[str, np.ndarray]:
 
 
 def _with_end(outcome: Outcome) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return times and positions with the robots' last positions, and their goals once arrived, at the end."""
+    """Return times and positions, with those at the end of the run (the goal of who arrived) added."""
     trace, robots = outcome.trace, outcome.trace.robots
     arrived = np.isfinite(robots["arrival_s"])
     end_x = np.where(arrived, outcome.setup.goals[:, 0], robots["x"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import asdict, is_dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -84,7 +85,7 @@ class GuardModel(_Strict):
 
 
 class SafetyModel(_Strict):
-    """Which directions count as safe (docs/theory.md); ``sector: true, look_ahead_m: 0`` is the printed rule alone."""
+    """Which directions are safe (docs/theory.md); ``sector: true, look_ahead_m: 0`` is the printed rule."""
 
     sector: bool = False
     look_ahead_m: NotNegative = 2.0
@@ -148,7 +149,7 @@ class Scenario(_Strict):
 
 
 def parse_scenario(values: Any, where: str) -> Scenario:
-    """Return the scenario in ``values``; raises ConfigError naming place, problem and the nearest valid key."""
+    """Return the scenario in ``values``; a ConfigError names place, problem and the nearest valid key."""
     if not isinstance(values, dict):
         raise ConfigError(where, "a scenario is a mapping of keys to values")
     try:
@@ -179,9 +180,9 @@ def read_scenario_file(path: Path) -> dict[str, Any]:
 
 
 def _find_map(scenario: Path, name: str) -> str:
-    """Return the map's path: beside the scenario, as it is, or packaged under that name."""
-    if not name.endswith((".yaml", ".yml")):
-        return str(packaged_map(name))
+    """Return the map's path: beside the scenario or as it is; names of packaged maps stay names."""
+    if _is_packaged(name):
+        return name
     beside = scenario.parent / name
     return str(beside) if beside.exists() else name
 
@@ -223,7 +224,7 @@ def make_setup(scenario: Scenario) -> Setup:
     if scenario.map is not None:
         from swarmscope.tasks import place_on_map
 
-        spec = map_world(Path(scenario.map.file))
+        spec = map_world(map_path(scenario.map.file))
         return place_on_map(spec, scenario.seed, scenario.robots, radius, scenario.map.min_distance_m)
     place = scenario.place
     if place is None or len(place.starts) != scenario.robots or len(place.goals) != scenario.robots:
@@ -233,6 +234,33 @@ def make_setup(scenario: Scenario) -> Setup:
     setup = Setup(place.world, np.array(place.starts, float), np.array(place.goals, float))
     check_setup(setup, radius)
     return setup
+
+
+def complete(scenario: Scenario) -> dict[str, Any]:
+    """Return the scenario as plain values, every default written out; ``parse_scenario`` reads it back."""
+    planner = load_planner(scenario.planner.name)
+    values = scenario.model_dump(mode="json", exclude_none=True)
+    values["planner"]["params"] = make_params(planner, scenario.planner.params)._asdict()
+    if scenario.task is not None:
+        values["task"]["options"] = task_options(load_task(scenario.task.name)) | scenario.task.options
+    if scenario.map is not None and not _is_packaged(scenario.map.file):
+        values["map"]["file"] = str(Path(scenario.map.file).resolve())
+    return values
+
+
+def task_options(task: Any) -> dict[str, float]:
+    """Return the options of a task module with their defaults: the fields of its ``...Options`` dataclass."""
+    kinds = [kind for name, kind in vars(task).items() if name.endswith("Options") and is_dataclass(kind)]
+    return {name: float(value) for kind in kinds for name, value in asdict(kind()).items()}
+
+
+def map_path(name: str) -> Path:
+    """Return the YAML file of a map: a path, or the name of a map that comes with the package."""
+    return packaged_map(name) if _is_packaged(name) else Path(name)
+
+
+def _is_packaged(name: str) -> bool:
+    return not name.endswith((".yaml", ".yml"))
 
 
 def map_world(path: Path) -> WorldSpec:
@@ -287,7 +315,7 @@ def make_setting(scenario: Scenario, setup: Setup, threads: int = 1) -> Setting:
     heavy = ticks * scenario.robots * scenario.lidar.beams > 4e7
     return Setting(
         world=compile_world(setup.world),
-        bounds=tuple(setup.world.bounds),
+        bounds=setup.world.bounds,
         starts=setup.starts,
         goals=setup.goals,
         beams=make_beams(scenario.lidar.beams, math.radians(scenario.lidar.fov_deg), scenario.lidar.range_m),

@@ -17,7 +17,7 @@ SCAN, SAFE, FILTERED, FEATURE = "#444444", "#2a9d57", "#3a6ea5", "#d1495b"
 
 
 def write_perceive_picture(path: Path, seen: Perception, title: str) -> Path:
-    """Draw ``PANELS`` scans, the one with most features of each part of the log; return the picture's path."""
+    """Draw ``PANELS`` scans, the richest of each part of the log; return the picture's path."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -40,7 +40,7 @@ def write_perceive_picture(path: Path, seen: Perception, title: str) -> Path:
 
 
 def _choose(seen: Perception) -> list[int]:
-    """Return the scan with most features of each of ``PANELS`` parts of the log; among equals the least free."""
+    """Return the scan with most features of each part of the log; among equals the least free."""
     worth = np.array([len(pairs) for pairs in seen.features]) - seen.safe.mean(axis=1)
     parts = np.array_split(np.arange(len(worth)), min(PANELS, len(worth)))
     return [int(part[np.argmax(worth[part])]) for part in parts]
@@ -59,7 +59,9 @@ def _draw_scan(panel: Any, seen: Perception, k: int) -> None:
         panel.fill(x, y, color=SAFE, alpha=0.25, lw=0, label=label)
         label = "_nolegend_"
     hit = np.isfinite(seen.ranges_m[k])
-    panel.plot(seen.filtered_m[k] * cos, seen.filtered_m[k] * sin, color=FILTERED, lw=1.2, label="filtered scan")
+    panel.plot(
+        seen.filtered_m[k] * cos, seen.filtered_m[k] * sin, color=FILTERED, lw=1.2, label="filtered scan"
+    )
     r = seen.ranges_m[k][hit]
     panel.plot(r * cos[hit], r * sin[hit], ".", color=SCAN, ms=2.5, label="returns")
     pairs = seen.features[k]
