@@ -1,0 +1,157 @@
+"""The picture of a run: the paths over the world, one PNG."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from swarmscope.sim.world import Circle, Grid, Obstacle, Polygon, Wall
+from swarmscope.viewing.run_data import (
+    RunData,
+    crash_ticks,
+    decision_ticks,
+    headline,
+    load_run,
+    replace_file,
+    summary_rows,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+LONG_SIDE_IN = 9.0
+"""Longer side of the drawn world on paper [inch]."""
+
+INK, FAINT, GROUND = "#2b333b", "#7b8590", "#fbfaf7"
+SOLID, SOLID_EDGE = "#c9d2c4", "#a4b19d"
+CRASH = "#c23b22"
+
+
+def write_picture(run_dir: Path) -> Path:
+    """Write ``paths.png`` into the run folder and return its path; the same run gives the same bytes."""
+    run = load_run(run_dir)
+    return replace_file(run.folder / "paths.png", _render(run))
+
+
+def _render(run: RunData) -> bytes:
+    import matplotlib as mpl
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        extent = _extent(run)
+        width, height = extent[2] - extent[0], extent[3] - extent[1]
+        inch = LONG_SIDE_IN / max(width, height)
+        size = (max(6.0, width * inch) + 1.0, max(2.5, height * inch) + 1.7)
+        figure = Figure(figsize=size, dpi=150, facecolor="white")
+        FigureCanvasAgg(figure)
+        axes = figure.add_axes((0.7 / size[0], 1.15 / size[1], 1.0 - 1.0 / size[0], 1.0 - 1.7 / size[1]))
+        _draw_frame(axes, extent)
+        _draw_obstacles(axes, run.world.obstacles)
+        _draw_robots(axes, run)
+        _draw_words(axes, figure, run)
+        buffer = io.BytesIO()
+        figure.savefig(buffer, format="png", metadata={"Software": None})
+    return buffer.getvalue()
+
+
+def _extent(run: RunData) -> tuple[float, float, float, float]:
+    """Return x0, y0, x1, y1 [m] around the bounds and everything a robot did."""
+    x0, y0, x1, y1 = run.world.bounds
+    margin = 2.0 * max(robot.radius for robot in run.world.robots)
+    xs = np.concatenate([run.trajectory.x_m.ravel(), [robot.goal[0] for robot in run.world.robots]])
+    ys = np.concatenate([run.trajectory.y_m.ravel(), [robot.goal[1] for robot in run.world.robots]])
+    low = min(x0, float(xs.min()) - margin), min(y0, float(ys.min()) - margin)
+    return *low, max(x1, float(xs.max()) + margin), max(y1, float(ys.max()) + margin)
+
+
+def _draw_frame(axes: Axes, extent: tuple[float, float, float, float]) -> None:
+    axes.set_xlim(extent[0], extent[2])
+    axes.set_ylim(extent[1], extent[3])
+    axes.set_aspect("equal")
+    axes.set_facecolor(GROUND)
+    axes.tick_params(colors=FAINT, labelsize=8, length=3)
+    axes.set_xlabel("x [m]", color=FAINT, fontsize=8, labelpad=2)
+    axes.set_ylabel("y [m]", color=FAINT, fontsize=8, labelpad=4)
+    for spine in axes.spines.values():
+        spine.set_color("#d5d8da")
+
+
+def _draw_obstacles(axes: Axes, obstacles: list[Obstacle]) -> None:
+    from matplotlib import patches
+    from matplotlib.collections import LineCollection, PatchCollection
+
+    solids: list[patches.Patch] = []
+    for obstacle in obstacles:
+        if isinstance(obstacle, Circle):
+            solids.append(patches.Circle(obstacle.center, obstacle.radius))
+        elif isinstance(obstacle, Polygon):
+            solids.append(patches.Polygon(obstacle.points))
+        elif isinstance(obstacle, Grid):
+            _draw_grid(axes, obstacle)
+    axes.add_collection(PatchCollection(solids, facecolor=SOLID, edgecolor=SOLID_EDGE, linewidth=0.8))
+    walls = [obstacle.points for obstacle in obstacles if isinstance(obstacle, Wall)]
+    axes.add_collection(LineCollection(walls, colors="#8c9a86", linewidths=2.2, capstyle="round"))
+
+
+def _draw_grid(axes: Axes, grid: Grid) -> None:
+    from matplotlib.collections import PolyCollection
+
+    (x0, y0), side = grid.origin, grid.resolution
+    runs = np.asarray(grid.rows, dtype=np.float64).reshape(-1, 3)
+    low, left, right = y0 + side * runs[:, 0], x0 + side * runs[:, 1], x0 + side * (runs[:, 2] + 1.0)
+    corners = np.array([[left, low], [right, low], [right, low + side], [left, low + side]])
+    axes.add_collection(PolyCollection(list(corners.transpose(2, 0, 1)), color=SOLID, lw=0.2))
+
+
+def _draw_robots(axes: Axes, run: RunData) -> None:
+    from matplotlib import colormaps
+
+    trajectory, robots = run.trajectory, run.world.robots
+    colours = colormaps["plasma"](np.linspace(0.0, 0.84, len(robots)))
+    ends = np.minimum(crash_ticks(trajectory), trajectory.t_s.size - 1)
+    goals = np.array([robot.goal for robot in robots])
+    axes.scatter(goals[:, 0], goals[:, 1], s=70, facecolor="none", edgecolor=colours, lw=1.4)
+    for i, colour in enumerate(colours):
+        x, y = trajectory.x_m[:, i], trajectory.y_m[:, i]
+        axes.plot(x, y, color=colour, lw=1.5, alpha=0.9, solid_joinstyle="round", solid_capstyle="round")
+        axes.scatter(robots[i].start[0], robots[i].start[1], s=22, color=[colour], lw=0, zorder=3)
+        chosen = decision_ticks(trajectory, i)
+        axes.scatter(
+            x[chosen], y[chosen], s=26, marker="D", facecolor="white", edgecolor=[colour], lw=1.1, zorder=4
+        )
+        if trajectory.collided[i]:
+            end = x[ends[i]], y[ends[i]]
+            axes.scatter(*end, marker="X", s=95, facecolor=CRASH, edgecolor="white", lw=1.0, zorder=5)
+
+
+def _draw_words(axes: Axes, figure: Any, run: RunData) -> None:
+    from matplotlib.lines import Line2D
+
+    axes.set_title(headline(run), loc="left", fontsize=12, color=INK, pad=10, fontweight="bold")
+    entries = [("start", "o", 5, FAINT, FAINT), ("goal", "o", 8, "none", FAINT)]
+    entries.append(("side chosen", "D", 5, "white", FAINT))
+    if np.any(run.trajectory.collided):
+        entries.append(("collision", "X", 8, CRASH, "white"))
+    handles = [
+        Line2D([], [], ls="none", label=label, marker=marker, ms=size, mfc=face, mec=edge)
+        for label, marker, size, face, edge in entries
+    ]
+    figure.legend(
+        handles=handles,
+        loc="lower left",
+        bbox_to_anchor=(0.6 / figure.get_figwidth(), 0.36 / figure.get_figheight()),
+        ncols=len(handles),
+        frameon=False,
+        fontsize=8.5,
+        labelcolor=INK,
+        handletextpad=0.2,
+        columnspacing=1.4,
+        borderpad=0.0,
+    )
+    caption = "     ".join(f"{words}  {value}" for words, value in summary_rows(run)[:4])
+    figure.text(0.7 / figure.get_figwidth(), 0.16 / figure.get_figheight(), caption, fontsize=9, color=INK)

@@ -1,0 +1,273 @@
+"""Reads a finished run folder for viewing; every file is checked, a wrong one is named with what is wrong."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from swarmscope.errors import InputFileError
+from swarmscope.evaluation.run_folder import TRAJECTORY, WORLD, read_metrics, read_trajectory, read_world
+from swarmscope.sim.world import Length, Number, Obstacle, Point
+
+Array = npt.NDArray[Any]
+
+
+class RobotEntry(BaseModel):
+    """One robot of ``world.json``: ``radius`` [m], ``start`` [x, y, yaw], ``goal`` [x, y] [m, rad]."""
+
+    model_config = ConfigDict(frozen=True)
+
+    id: int
+    radius: Length
+    start: tuple[Number, Number, Number]
+    goal: Point
+
+
+class WorldFile(BaseModel):
+    """The content of ``world.json``; ``bounds`` is [x0, y0, x1, y1] [m]."""
+
+    model_config = ConfigDict(frozen=True)
+
+    robots: list[RobotEntry] = Field(min_length=1)
+    obstacles: list[Obstacle]
+    bounds: tuple[Number, Number, Number, Number]
+
+
+class Trajectory(NamedTuple):
+    """The arrays of ``trajectory.npz``: T ticks, N robots, B beams. Scans and safe bits may have no ticks."""
+
+    t_s: Array
+    """(T,) rising."""
+    x_m: Array
+    """(T, N), as all up to ``neighbours``."""
+    y_m: Array
+    yaw_rad: Array
+    state: Array
+    """Index into ``state_names``."""
+    reason: Array
+    """Index into ``reason_names``."""
+    speed_mps: Array
+    clearance_m: Array
+    p_left: Array
+    """NaN before the first choice of a side."""
+    side: Array
+    """+1 left, -1 right, 0 none."""
+    bytes_sent: Array
+    """Running total."""
+    neighbours: Array
+    state_names: Array
+    reason_names: Array
+    beam_angles: Array
+    """(B,) sensor frame [rad]."""
+    scan_u8: Array
+    """(T, N, B) 0..254 = range / range_max, 255 = no return."""
+    safe_bits: Array
+    """(T, N, ceil(B / 8)), beam 0 in the highest bit."""
+    links: Array
+    """(L, 4) tick, from, to, bytes."""
+    arrival_s: Array
+    """(N,) NaN = not arrived."""
+    collided: Array
+    """(N,)"""
+    range_max_m: Array
+    """Scalar."""
+
+
+@dataclass(frozen=True)
+class RunData:
+    """A finished run: its folder, world, trajectory and the content of ``metrics.json``."""
+
+    folder: Path
+    world: WorldFile
+    trajectory: Trajectory
+    metrics: dict[str, Any]
+
+
+_KINDS = {
+    "state_names": "U",
+    "reason_names": "U",
+    "state": "ui",
+    "reason": "ui",
+    "side": "if",
+    "bytes_sent": "ui",
+    "neighbours": "ui",
+    "scan_u8": "u",
+    "safe_bits": "u",
+    "links": "ui",
+    "collided": "uib",
+}
+"""Kinds of numbers that an array may hold; those not listed hold real numbers."""
+
+_PER_TICK = Trajectory._fields[1 : Trajectory._fields.index("neighbours") + 1]
+
+
+def load_run(run_dir: Path) -> RunData:
+    """Return the run in ``run_dir``; an `InputFileError` names the file that is missing, torn or foreign."""
+    folder = Path(run_dir)
+    metrics = read_metrics(folder)
+    world = _checked_world(folder / WORLD, read_world(folder))
+    trajectory = _checked_trajectory(folder / TRAJECTORY, read_trajectory(folder), len(world.robots))
+    return RunData(folder, world, trajectory, metrics)
+
+
+def decision_ticks(trajectory: Trajectory, robot: int) -> Array:
+    """Return the ticks at which ``robot`` chose a side: those at which its P(left) took a new value."""
+    p_left = trajectory.p_left[:, robot]
+    before = np.concatenate([[np.nan], p_left[:-1]])
+    fresh = np.isfinite(p_left) & (p_left != before)
+    return np.flatnonzero(fresh)
+
+
+def crash_ticks(trajectory: Trajectory) -> Array:
+    """Return (N,) the tick from which each robot counts as crashed; T for those that never collided."""
+    ticks, robots = trajectory.x_m.shape
+    moved = (np.diff(trajectory.x_m, axis=0) != 0.0) | (np.diff(trajectory.y_m, axis=0) != 0.0)
+    first = np.full(robots, ticks, dtype=np.int64)
+    for robot in np.flatnonzero(trajectory.collided):
+        named = np.flatnonzero(trajectory.state_names[trajectory.state[:, robot]] == "crashed")
+        steps = np.flatnonzero(moved[:, robot])
+        first[robot] = named[0] if named.size else (steps[-1] + 1 if steps.size else 0)
+    return first
+
+
+def replace_file(path: Path, content: bytes) -> Path:
+    """Write ``content`` under a temporary name, then rename it to ``path``: no reader meets half a file."""
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        with temporary.open("wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+    return path
+
+
+def _checked_world(path: Path, content: Mapping[str, Any]) -> WorldFile:
+    try:
+        return WorldFile.model_validate(content)
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(str(part) for part in first["loc"])
+        raise InputFileError(path, f"{place}: {first['msg']}") from None
+
+
+def _checked_trajectory(path: Path, arrays: Mapping[str, Array], robots: int) -> Trajectory:
+    missing = [name for name in Trajectory._fields if name not in arrays]
+    if missing:
+        raise InputFileError(path, f"lacks {', '.join(missing)}")
+    trajectory = Trajectory(**{name: arrays[name] for name in Trajectory._fields})
+    why = _first_fault(trajectory, robots)
+    if why:
+        raise InputFileError(path, why)
+    return trajectory
+
+
+def _first_fault(trajectory: Trajectory, robots: int) -> str:
+    """Return what is wrong with the arrays, or an empty string."""
+    for name, array in zip(Trajectory._fields, trajectory, strict=True):
+        if array.dtype.kind not in _KINDS.get(name, "fui"):
+            return f"{name} holds {array.dtype}, not what it should"
+    return _shape_fault(trajectory, robots) or _value_fault(trajectory, robots)
+
+
+def _shape_fault(trajectory: Trajectory, robots: int) -> str:
+    ticks, beams = trajectory.t_s.size, trajectory.beam_angles.size
+    wanted: dict[str, tuple[int, ...]] = dict.fromkeys(_PER_TICK, (ticks, robots))
+    wanted |= {"t_s": (ticks,), "beam_angles": (beams,), "arrival_s": (robots,), "collided": (robots,)}
+    wanted |= {"links": (trajectory.links.shape[0] if trajectory.links.ndim else 0, 4), "range_max_m": ()}
+    for name, width in (("scan_u8", beams), ("safe_bits", (beams + 7) // 8)):
+        array: Array = getattr(trajectory, name)
+        if array.ndim == 0 or array.shape[0] > 0:
+            wanted[name] = (ticks, robots, width)
+    for name, shape in wanted.items():
+        found = getattr(trajectory, name).shape
+        if found != shape:
+            return f"{name} has shape {found}, expected {shape} for {ticks} ticks and {robots} robots"
+    return "holds no ticks" if ticks == 0 else ""
+
+
+def _value_fault(trajectory: Trajectory, robots: int) -> str:
+    for name in ("t_s", "x_m", "y_m", "yaw_rad", "beam_angles", "range_max_m"):
+        if not np.all(np.isfinite(getattr(trajectory, name))):
+            return f"{name} holds values that are not finite"
+    if np.any(np.diff(trajectory.t_s) <= 0.0):
+        return "t_s does not rise"
+    for name in ("state", "reason"):
+        indices, names = getattr(trajectory, name), getattr(trajectory, f"{name}_names")
+        if names.ndim != 1 or np.any(indices < 0) or np.any(indices >= names.size):
+            return f"{name} holds an index without a name in {name}_names"
+    limits = np.array([trajectory.t_s.size, robots, robots])
+    if np.any(trajectory.links[:, :3] < 0) or np.any(trajectory.links[:, :3] >= limits):
+        return "links names a tick or a robot that does not exist"
+    return ""
+
+
+_KEY_FIGURES: tuple[tuple[str, str, str], ...] = (
+    ("arrival_rate", "Arrived (AR)", "%"),
+    ("path_redundancy", "Path redundancy γ", "%"),
+    ("collisions", "Collisions", ""),
+    ("duration_s", "Last arrival", "s"),
+    ("average_path_length_m", "Mean path", "m"),
+    ("spl", "SPL", "%"),
+    ("waiting_s", "Waiting, per robot", "s"),
+    ("min_clearance_m", "Smallest clearance", "m"),
+    ("fusions", "Sides chosen", ""),
+    ("messages", "Packets sent", ""),
+    ("bytes_sent", "Payload sent", "bytes"),
+)
+"""Figures of ``metrics.json`` that are shown: name, words, unit; the first four make the caption."""
+
+
+def headline(run: RunData) -> str:
+    """Return what was run in one line, such as ``T1 · nav-scope · 15 robots · seed 0``."""
+    about = run.metrics.get("run")
+    about = about if isinstance(about, Mapping) else {}
+    robots = len(run.world.robots)
+    parts = [str(about[key]) for key in ("task", "planner") if about.get(key) is not None]
+    parts.append(f"{robots} robot{'' if robots == 1 else 's'}")
+    if about.get("seed") is not None:
+        parts.append(f"seed {about['seed']}")
+    return " · ".join(parts)
+
+
+def summary_rows(run: RunData) -> list[tuple[str, str]]:
+    """Return the key figures as (words, value), most important first; missing ones are left out."""
+    figures = _counted_figures(run.trajectory) | run.metrics
+    return [(words, _in_words(figures[name], unit)) for name, words, unit in _KEY_FIGURES if name in figures]
+
+
+def failure_reasons(run: RunData) -> dict[int, str]:
+    """Return why robots did not arrive, by robot id, as far as ``metrics.json`` says so."""
+    listed = run.metrics.get("failures")
+    entries = [entry for entry in listed if isinstance(entry, Mapping)] if isinstance(listed, list) else []
+    return {int(e["robot"]): str(e["why"]) for e in entries if isinstance(e.get("robot"), int) and "why" in e}
+
+
+def _counted_figures(trajectory: Trajectory) -> dict[str, float | None]:
+    """Return the figures that the trajectory itself tells, used where ``metrics.json`` is silent."""
+    arrived = trajectory.arrival_s[np.isfinite(trajectory.arrival_s)]
+    return {
+        "arrival_rate": arrived.size / trajectory.arrival_s.size,
+        "collisions": int(np.count_nonzero(trajectory.collided)),
+        "duration_s": float(arrived.max()) if arrived.size else None,
+    }
+
+
+def _in_words(value: Any, unit: str) -> str:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        return "–"
+    if unit == "%":
+        return f"{100.0 * value:.1f} %"
+    if isinstance(value, int):
+        return f"{value:,} {unit}".replace(",", "\u202f").strip()
+    return f"{value:.3g} {unit}".strip() if abs(value) < 10.0 else f"{value:.1f} {unit}".strip()
