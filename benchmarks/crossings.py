@@ -62,14 +62,15 @@ def one(job: tuple[str, int, tuple[str, ...], bool]) -> dict[str, Any]:
     metrics = figures(outcome)
     robots = outcome.trace.robots
     arrived = np.isfinite(robots["arrival_s"])
+    compared = arrived & np.isfinite(outcome.shortest_m)
     row = {key: metrics.get(key) for key in KEPT}
     return row | {
         "task": task,
         "seed": seed,
         "robots": len(robots),
         "arrived": int(arrived.sum()),
-        "travelled_m": float(robots["length"][arrived].sum()),
-        "shortest_m": float(outcome.shortest_m[arrived].sum()),
+        "travelled_m": float(robots["length"][compared].sum()),
+        "shortest_m": float(outcome.shortest_m[compared].sum()),
     }
 
 
@@ -88,13 +89,13 @@ def summarise(task: str, rows: list[dict[str, Any]]) -> None:
     robots, arrived = sum(r["robots"] for r in rows), sum(r["arrived"] for r in rows)
     share = wilson(arrived, robots)
     travelled, shortest = (sum(r[k] for r in rows) for k in ("travelled_m", "shortest_m"))
-    gamma = 1.0 - arrived / robots * shortest / travelled
+    gamma = 1.0 - arrived / robots * shortest / travelled if travelled > 0.0 else float("nan")
     per_map = bootstrap_mean(values(rows, "path_redundancy"))
     print(f"{task}: {len(rows)} runs, {arrived} of {robots} robots arrived", end=" ")
     print(f"({share.estimate:.2%}, 95 % {share.low:.2%} to {share.high:.2%})")
     print(f"  path redundancy {gamma:.2%} (published {PUBLISHED.get(task, float('nan')):.1%})", end=" ")
     print(f"per map {per_map.estimate:.2%} ({per_map.low:.2%} to {per_map.high:.2%})")
-    print(f"  stretch over A* {travelled / shortest:.4f}", end=" ")
+    print(f"  stretch over A* {travelled / shortest if shortest > 0.0 else float('nan'):.4f}", end=" ")
     true = values(rows, "path_stretch_any_angle")
     if np.isfinite(true).any():
         print(f"over the true shortest way {np.nanmean(true):.4f}", end=" ")

@@ -138,10 +138,11 @@ def read_options(
     if planner is not None:
         _choose(values, "planner", "name", planner)
     values |= {key: value for key, value in options.items() if value is not None}
+    named = {change.replace("=", ".").partition(".")[0] for change in changes}
+    if not any(key in values for key in PLACES) and not named & {"map", "place"}:
+        values["task"] = {"name": "T1"}
     for change in changes:
         set_key(values, change)
-    if not any(key in values for key in PLACES):
-        values["task"] = {"name": "T1"}
     return parse_scenario(values, str(file) if file is not None else "command line")
 
 

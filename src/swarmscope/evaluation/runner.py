@@ -154,7 +154,9 @@ def failures(outcome: Outcome) -> list[dict[str, Any]]:
     found = []
     for i in np.flatnonzero(~np.isfinite(robots["arrival_s"])):
         state, reason = STATE_NAMES[records.state[-1, i]], REASON_NAMES[records.reason[-1, i]]
-        why = "collided" if robots["crashed"][i] else f"time limit in state '{state}': {reason}"
+        to_go = float(np.hypot(robots["goal_x"][i] - robots["x"][i], robots["goal_y"][i] - robots["y"][i]))
+        late = f"time limit in state '{state}': {reason}; {to_go:.1f} m from its goal"
+        why = "collided" if robots["crashed"][i] else late
         found.append({"robot": int(i), "why": why})
     return found
 

@@ -119,7 +119,7 @@ class PlannerModel(_Strict):
     """A planner by name, with its parameters."""
 
     name: str = "nav-scope"
-    params: dict[str, float] = {}
+    params: dict[str, Annotated[float, Field(allow_inf_nan=False)]] = {}
 
 
 class Scenario(_Strict):
@@ -250,7 +250,7 @@ def complete(scenario: Scenario) -> dict[str, Any]:
 
 def task_options(task: Any) -> dict[str, float]:
     """Return the options of a task module with their defaults: the fields of its ``...Options`` dataclass."""
-    kinds = [kind for name, kind in vars(task).items() if name.endswith("Options") and is_dataclass(kind)]
+    kinds: list[Any] = [k for name, k in vars(task).items() if name.endswith("Options") and is_dataclass(k)]
     return {name: float(value) for kind in kinds for name, value in asdict(kind()).items()}
 
 

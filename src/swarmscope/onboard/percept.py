@@ -7,7 +7,7 @@ without the radio. *Body frame*: x forward, y left. *Compass frame*: x east, y n
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -16,6 +16,8 @@ from swarmscope.onboard.perception.safety import reach_table
 from swarmscope.onboard.robot import Body, Protection, protection_model
 from swarmscope.onboard.sharing.message import MAX_FEATURES, MAX_PACKET_BYTES
 
+Row: TypeAlias = Any
+"""One robot's row of a structured array below (numpy.void in Python, a record in kernels)."""
 MAX_NEIGHBOURS = 10
 """Neighbours that mutual positioning reports in one tick, nearest first."""
 MAX_INBOX = 8

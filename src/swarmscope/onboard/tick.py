@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from swarmscope._jit import jit
 from swarmscope.onboard.control.guard import guard
-from swarmscope.onboard.percept import Rig
+from swarmscope.onboard.percept import Rig, Row
 from swarmscope.onboard.perception.features import align_features, extrema
 from swarmscope.onboard.perception.filters import filter_padded, prepare_scan
 from swarmscope.onboard.perception.safety import safe_directions
@@ -19,9 +17,9 @@ from swarmscope.onboard.sharing.tracks import mask_moving_neighbours, update_odo
 @jit
 def begin(
     ranges: np.ndarray,
-    percept: np.ndarray,
-    shared: np.ndarray,
-    decision: np.ndarray,
+    percept: Row,
+    shared: Row,
+    decision: Row,
     work: np.ndarray,
     edges: np.ndarray,
     safe: np.ndarray,
@@ -50,7 +48,7 @@ def begin(
 @jit
 def features(
     work: np.ndarray,
-    percept: np.ndarray,
+    percept: Row,
     safe: np.ndarray,
     padded: np.ndarray,
     angles: np.ndarray,
@@ -78,7 +76,7 @@ def features(
 
 @jit
 def finish(
-    ranges: np.ndarray, percept: np.ndarray, shared: np.ndarray, decision: np.ndarray, edges: np.ndarray, rig: Rig
+    ranges: np.ndarray, percept: Row, shared: Row, decision: Row, edges: np.ndarray, rig: Rig
 ) -> None:
     """Let the guard have the last word."""
     guard(ranges, percept, shared, decision, edges, rig)

@@ -7,6 +7,8 @@ import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
+from functools import partial
+from itertools import pairwise
 from types import ModuleType
 from typing import Any
 
@@ -106,10 +108,10 @@ def settle(sim: Sim, tick: int) -> bool:
     """Judge the tick and sort the robots anew; return whether everybody has arrived or crashed."""
     judge(sim, tick)
     index_robots(sim)
+    done = 0
     for i in range(sim.robots.size):
-        if not (sim.robots[i]["arrived"] or sim.robots[i]["crashed"]):
-            return False
-    return True
+        done += sim.robots[i]["arrived"] or sim.robots[i]["crashed"]
+    return done == sim.robots.size
 
 
 @jit_inner
@@ -165,11 +167,10 @@ def run(setting: Setting, progress: Callable[[float, int], None] | None = None) 
         else:
             record_tick(sim, scratch.safe, chunks[-1], row, beams > 0)
             exchange(sim, tick)
-            now = tick
-            pool.each(lambda a, b: move(sim, now, a, b))
+            pool.each(partial(move, sim, tick))
             done = settle(sim, tick)
             if not done:
-                pool.each(lambda a, b: sense(sim, now + 1, a, b))
+                pool.each(partial(sense, sim, tick + 1))
         tick += 1
         if progress is not None and tick % 50 == 0:
             progress(tick * setting.dt, int((sim.robots["arrived"] | sim.robots["crashed"]).sum()))
@@ -200,7 +201,7 @@ class _Pool:
     def __init__(self, robots: int, threads: int) -> None:
         self.size = max(1, min(threads, robots))
         edges = np.linspace(0, robots, self.size + 1).astype(int)
-        self._parts = [(int(a), int(b)) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+        self._parts = [(int(a), int(b)) for a, b in pairwise(edges)]
         self._pool = ThreadPoolExecutor(self.size) if self.size > 1 else None
 
     def each(self, kernel: Callable[[int, int], None]) -> None:

@@ -49,9 +49,11 @@ def _send(sim: Sim, tick: int, i: int, k: int) -> None:
         sender["unreachable"] += 1
         return
     receiver["radio_free_s"] = begin + airtime
-    if radio.loss > 0.0 and uniform(mix(key(sim.clock.seed, i, tick, RADIO_LOSS) + key(0, k, 0, RADIO_LOSS))) < radio.loss:
-        sender["lost"] += 1
-        return
+    if radio.loss > 0.0:
+        chance = uniform(mix(key(sim.clock.seed, i, tick, RADIO_LOSS) + key(0, k, 0, RADIO_LOSS)))
+        if chance < radio.loss:
+            sender["lost"] += 1
+            return
     q = receiver["queued"]
     if q >= QUEUE:
         sender["crowded"] += 1

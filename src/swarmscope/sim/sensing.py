@@ -6,7 +6,7 @@ import math
 
 from swarmscope._jit import jit, jit_inner
 from swarmscope.geometry import wrap_angle
-from swarmscope.onboard.percept import MAX_INBOX, MAX_NEIGHBOURS
+from swarmscope.onboard.percept import MAX_INBOX, MAX_NEIGHBOURS, Row
 from swarmscope.sim.cells import column_of, row_of
 from swarmscope.sim.lidar import cast_disc, cast_static
 from swarmscope.sim.state import Sim
@@ -97,7 +97,7 @@ def _scan_and_neighbours(sim: Sim, tick: int, i: int) -> None:
 
 
 @jit_inner
-def _insert(percept: object, found: int, j: int, bx: float, by: float) -> int:
+def _insert(percept: Row, found: int, j: int, bx: float, by: float) -> int:
     """Insert neighbour j into the list sorted by distance; return its new length."""
     ids, xs, ys = percept["neighbour_id"], percept["neighbour_x"], percept["neighbour_y"]
     d2 = bx * bx + by * by

@@ -196,13 +196,17 @@ def new_records(ticks: int, robots: int, beams: int) -> Records:
     shape = (ticks, robots)
     scans = ticks if beams else 0
     return Records(
-        *(np.zeros(shape) for _ in range(3)),
-        *(np.zeros(shape, np.float32) for _ in range(3)),
-        np.zeros(shape, np.uint8),
-        np.zeros(shape, np.uint8),
-        np.zeros(shape, np.int8),
-        np.zeros(shape, np.uint8),
-        np.zeros(shape, np.int32),
-        np.zeros((scans, robots, beams), np.uint8),
-        np.zeros((scans, robots, (beams + 7) // 8), np.uint8),
+        x=np.zeros(shape),
+        y=np.zeros(shape),
+        yaw=np.zeros(shape),
+        speed=np.zeros(shape, np.float32),
+        clearance=np.zeros(shape, np.float32),
+        p_left=np.zeros(shape, np.float32),
+        state=np.zeros(shape, np.uint8),
+        reason=np.zeros(shape, np.uint8),
+        side=np.zeros(shape, np.int8),
+        neighbours=np.zeros(shape, np.uint8),
+        bytes_sent=np.zeros(shape, np.int32),
+        scan=np.zeros((scans, robots, beams), np.uint8),
+        safe=np.zeros((scans, robots, (beams + 7) // 8), np.uint8),
     )

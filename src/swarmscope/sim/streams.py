@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from statistics import NormalDist
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -11,6 +12,8 @@ from swarmscope._jit import jit, jit_inline
 SCAN_NOISE, SCAN_DROP, RANGE_NOISE, BEARING_NOISE, COMPASS_NOISE, RADIO_LOSS = range(1, 7)
 """Purposes."""
 
+Bits: TypeAlias = Any
+"""64 random bits, a numpy uint64."""
 _LEVELS = 4096
 _quantiles = np.array([NormalDist().inv_cdf((k + 0.5) / _LEVELS) for k in range(_LEVELS)])
 NORMAL_TABLE = (_quantiles / _quantiles.std()).astype(np.float32)
@@ -25,7 +28,7 @@ _S12 = np.uint64(12)
 
 
 @jit_inline
-def mix(z: int) -> int:
+def mix(z: Bits) -> Bits:
     """Return the splitmix64 finaliser of ``z`` (uint64): every input bit reaches every output bit."""
     z = (z ^ (z >> _S30)) * _B
     z = (z ^ (z >> _S27)) * _C
@@ -33,7 +36,7 @@ def mix(z: int) -> int:
 
 
 @jit
-def key(seed: int, robot: int, tick: int, purpose: int) -> int:
+def key(seed: int, robot: int, tick: int, purpose: int) -> Bits:
     """Return the start (uint64) of the stream for this seed, robot, tick and purpose."""
     k = mix(np.uint64(seed) + _A)
     k = mix(k + np.uint64(robot) * _A + np.uint64(1))
@@ -42,19 +45,19 @@ def key(seed: int, robot: int, tick: int, purpose: int) -> int:
 
 
 @jit_inline
-def uniform(k: int) -> float:
+def uniform(k: Bits) -> float:
     """Return a number in [0, 1) from the random bits ``k``."""
     return float(k >> _S11) * 1.1102230246251565e-16
 
 
 @jit_inline
-def normal(k: int) -> float:
+def normal(k: Bits) -> float:
     """Return a standard normal number from the random bits ``k``."""
     return float(NORMAL_TABLE[int(k & _MASK)])
 
 
 @jit
-def add_scan_noise(ranges: np.ndarray, k: int, sigma: float, range_max: float) -> None:
+def add_scan_noise(ranges: np.ndarray, k: Bits, sigma: float, range_max: float) -> None:
     """Multiply every return by (1 + sigma * normal); what leaves ``range_max`` is no return (+inf)."""
     state = k
     bits = k
@@ -68,7 +71,7 @@ def add_scan_noise(ranges: np.ndarray, k: int, sigma: float, range_max: float) -
 
 
 @jit
-def drop_returns(ranges: np.ndarray, k: int, probability: float) -> None:
+def drop_returns(ranges: np.ndarray, k: Bits, probability: float) -> None:
     """Lose each return with ``probability``: no return (+inf) instead."""
     state = k
     for n in range(ranges.size):

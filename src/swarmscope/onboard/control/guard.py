@@ -16,7 +16,7 @@ import numpy as np
 from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.geometry import point_segment_distance
 from swarmscope.onboard.control.unicycle import ramp, steer
-from swarmscope.onboard.percept import PEERS, Rig
+from swarmscope.onboard.percept import PEERS, Rig, Row
 from swarmscope.onboard.sharing.tracks import neighbour_reach
 
 STEPS = 4
@@ -27,7 +27,7 @@ PIECES = STEPS + 1
 
 @jit
 def guard(
-    ranges: np.ndarray, percept: np.ndarray, shared: np.ndarray, decision: np.ndarray, near: np.ndarray, rig: Rig
+    ranges: np.ndarray, percept: Row, shared: Row, decision: Row, near: np.ndarray, rig: Rig
 ) -> bool:
     """Lower ``decision``'s speed until it is safe; return whether it had to. ``near (M + 1,) int16`` is scratch.
 
@@ -81,8 +81,8 @@ def least_range(rig: Rig) -> float:
 @jit_inner
 def _passes(
     ranges: np.ndarray,
-    percept: np.ndarray,
-    shared: np.ndarray,
+    percept: Row,
+    shared: Row,
     v0: float,
     v: float,
     w: float,
@@ -140,7 +140,7 @@ def _passes(
 
 
 @jit_inner
-def _point_gap(percept: np.ndarray, shared: np.ndarray, px: float, py: float, rig: Rig) -> bool:
+def _point_gap(percept: Row, shared: Row, px: float, py: float, rig: Rig) -> bool:
     """Tell whether the return at (px, py), body frame, may belong to a neighbour."""
     c, s = math.cos(percept["compass"]), math.sin(percept["compass"])
     gx, gy = c * px - s * py, s * px + c * py
@@ -175,7 +175,7 @@ def _in_own_half(
 
 @jit_inner
 def _clear_of_tracks(
-    percept: np.ndarray, shared: np.ndarray, x4: float, y4: float, x5: float, y5: float, brake: float, rig: Rig
+    percept: Row, shared: Row, x4: float, y4: float, x5: float, y5: float, brake: float, rig: Rig
 ) -> bool:
     """Apply the half-gap rule to every tracked neighbour, seen now or remembered."""
     c, s = math.cos(percept["compass"]), math.sin(percept["compass"])
@@ -196,13 +196,13 @@ def _clear_of_tracks(
 
 
 @jit
-def halt(decision: np.ndarray) -> None:
+def halt(decision: Row) -> None:
     """Ask for standing still."""
     decision["v"], decision["w"] = 0.0, 0.0
 
 
 @jit
-def head_for(decision: np.ndarray, percept: np.ndarray, heading: float, speed: float, rig: Rig) -> None:
+def head_for(decision: Row, percept: Row, heading: float, speed: float, rig: Rig) -> None:
     """Ask for driving towards ``heading`` (body frame) at ``speed`` once turned."""
     decision["heading"] = heading
     decision["v"], decision["w"] = steer(heading, speed, rig.body.w_max, percept["dt_s"])

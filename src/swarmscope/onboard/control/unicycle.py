@@ -15,7 +15,7 @@ TURN_IN_PLACE_BEYOND = math.radians(70.0)
 
 @jit
 def steer(heading: float, speed: float, w_max: float, dt: float) -> tuple[float, float]:
-    """Return (v [m/s], w [rad/s]) that turns towards ``heading`` (body frame, rad), reached at the next tick if possible.
+    """Return (v [m/s], w [rad/s]) that turns towards ``heading`` (body frame, rad) by the next tick if possible.
 
     The speed falls linearly from ``speed`` to 0 between the two heading errors above.
     """
@@ -36,7 +36,7 @@ def arrival_speed(distance: float, v_max: float, a_max: float, dt: float) -> flo
 
 @jit_inline
 def ramp(speed: float, wanted: float, a_max: float, dt: float) -> tuple[float, float]:
-    """Return (speed after ``dt`` [m/s], way made [m]) of a speed that goes to ``wanted`` as fast as ``a_max`` lets it."""
+    """Return (speed after ``dt`` [m/s], way made [m]) of a speed that goes to ``wanted`` as ``a_max`` lets it."""
     change = wanted - speed
     t = min(dt, abs(change) / a_max)
     after = speed + (t * a_max if change > 0.0 else -t * a_max)

@@ -48,7 +48,7 @@ def extrema(
         change = filtered[after] - filtered[n]
         if change > flat or change < -flat:
             sign = 1 if change > flat else -1
-            if rising != 0 and sign != rising:
+            if rising not in (0, sign):
                 beam = slope_at + 1 + (k - slope_step - 1) // 2
                 if beam >= beams:
                     beam -= beams
@@ -111,7 +111,7 @@ def reconstruct(angles: np.ndarray, distances: np.ndarray, count: int, phi: floa
     if count == 0:
         return 0.0
     if count == 1:
-        return distances[0]
+        return float(distances[0])
     right = 0
     while right < count and angles[right] <= phi:
         right += 1
@@ -121,8 +121,8 @@ def reconstruct(angles: np.ndarray, distances: np.ndarray, count: int, phi: floa
     b = angles[right] if right < count else angles[0] + TWO_PI
     d_b = distances[right] if right < count else distances[0]
     if b - a <= 1e-12:
-        return d_b
+        return float(d_b)
     if chords and b - a < math.pi:
         across = d_a * math.sin(phi - a) + d_b * math.sin(b - phi)
-        return d_a * d_b * math.sin(b - a) / across if across > 1e-12 else 0.0
-    return d_a + (d_b - d_a) * (phi - a) / (b - a)
+        return float(d_a * d_b * math.sin(b - a) / across) if across > 1e-12 else 0.0
+    return float(d_a + (d_b - d_a) * (phi - a) / (b - a))

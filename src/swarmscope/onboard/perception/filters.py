@@ -32,7 +32,8 @@ def feature_filter(half: int, beta: float = KAISER_BETA) -> np.ndarray:
     n = np.arange(-half, half + 1)
     f_c = 1.0 / max(1, 2 * half)
     taps = 2.0 * f_c * np.sinc(2.0 * f_c * n) * np.kaiser(2 * half + 1, beta)
-    return (taps / taps.sum()).astype(np.float32)
+    normalised: np.ndarray = (taps / taps.sum()).astype(np.float32)
+    return normalised
 
 
 @jit
@@ -73,7 +74,8 @@ def filter_padded(padded: np.ndarray, taps: np.ndarray, range_max: float, out: n
         out[n] = limit - centre * middle[n]
     k = 1
     while k + 4 <= half:  # five taps a pass: the loop is bound by loads and stores
-        t0, t1, t2, t3, t4 = taps[half + k], taps[half + k + 1], taps[half + k + 2], taps[half + k + 3], taps[half + k + 4]
+        t0, t1, t2 = taps[half + k], taps[half + k + 1], taps[half + k + 2]
+        t3, t4 = taps[half + k + 3], taps[half + k + 4]
         low = padded[half - k - 4 : half - k + beams]
         high = padded[half + k : half + k + 4 + beams]
         for n in range(beams):

@@ -8,7 +8,6 @@ import numpy as np
 
 from swarmscope._jit import jit, jit_inner
 
-
 BINS = 512
 """Entries of a reach table over [0, range_max): 1 cm each at 5 m."""
 BORDER = BINS + 1
@@ -63,7 +62,13 @@ def reach_table(
 
 @jit
 def safe_directions(
-    ranges: np.ndarray, range_min: float, range_max: float, wraps: bool, reach: np.ndarray, edges: np.ndarray, safe: np.ndarray
+    ranges: np.ndarray,
+    range_min: float,
+    range_max: float,
+    wraps: bool,
+    reach: np.ndarray,
+    edges: np.ndarray,
+    safe: np.ndarray,
 ) -> int:
     """Write 1 into ``safe (M,)`` for each beam direction that is safe, else 0; return how many are.
 

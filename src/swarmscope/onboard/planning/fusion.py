@@ -8,7 +8,7 @@ import numpy as np
 
 from swarmscope._jit import jit, jit_inner
 from swarmscope.geometry import wrap_angle
-from swarmscope.onboard.percept import PEERS, Rig
+from swarmscope.onboard.percept import PEERS, Rig, Row
 from swarmscope.onboard.perception.areas import normalise, passable_distance, quadrant_area
 from swarmscope.onboard.perception.features import align_features
 from swarmscope.onboard.planning.fields import (
@@ -35,9 +35,9 @@ def own_probability(angles: np.ndarray, distances: np.ndarray, count: int, half_
 
 @jit
 def choose_side(
-    percept: np.ndarray,
-    shared: np.ndarray,
-    decision: np.ndarray,
+    percept: Row,
+    shared: Row,
+    decision: Row,
     rig: Rig,
     w_i: float,
     bias: float,
@@ -96,7 +96,7 @@ def _normalise_all(distances: np.ndarray, count: int, range_max: float) -> None:
 
 
 @jit_inner
-def _heard_of(shared: np.ndarray, peer: int) -> int:
+def _heard_of(shared: Row, peer: int) -> int:
     """Return the slot with the features of ``peer``, or -1."""
     for p in range(PEERS):
         if shared["heard_id"][p] == peer and shared["heard_n"][p] > 0:

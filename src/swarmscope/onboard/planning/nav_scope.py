@@ -15,7 +15,7 @@ from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.geometry import TWO_PI, angle_from, wrap_angle
 from swarmscope.onboard.control.guard import halt, head_for
 from swarmscope.onboard.control.unicycle import FULL_SPEED_WITHIN, arrival_speed
-from swarmscope.onboard.percept import PEERS, Rig, Scratch
+from swarmscope.onboard.percept import PEERS, Rig, Row, Scratch
 from swarmscope.onboard.perception.safety import beam_of, corridor_length, safe_directions
 from swarmscope.onboard.planning._contract import (
     ADVANCE,
@@ -87,7 +87,7 @@ MEMORY = np.dtype(
         ("strict", np.uint8),  # follows the border until closer to the goal than ever (after a loop)
         ("heading", np.float64),  # direction of travel, compass frame [rad]
         ("turning", np.uint8),  # turns on the spot towards it
-        ("wind", np.float64),  # how far the following has turned off the target, on its side, may exceed a circle [rad]
+        ("wind", np.float64),  # how far the following has turned off the target; may exceed 2 pi [rad]
         ("target", np.float64),  # direction of the target at the last tick, compass frame [rad]
         ("travel", np.float64),  # way made so far, by odometry [m]
         ("left_at", np.float64),  # of it when the last following ended [m]
@@ -121,10 +121,10 @@ def new_memory(robots: int) -> np.ndarray:
 @jit
 def step(
     ranges: np.ndarray,
-    percept: np.ndarray,
-    shared: np.ndarray,
-    memory: np.ndarray,
-    decision: np.ndarray,
+    percept: Row,
+    shared: Row,
+    memory: Row,
+    decision: Row,
     scratch: Scratch,
     row: int,
     rig: Rig,
@@ -180,7 +180,7 @@ def step_all(
     last: int,
     ranges: np.ndarray,
     percepts: np.ndarray,
-    shared: np.ndarray,
+    shared: Row,
     memories: np.ndarray,
     decisions: np.ndarray,
     scratch: Scratch,
@@ -195,10 +195,10 @@ def step_all(
 @jit
 def decide(
     ranges: np.ndarray,
-    percept: np.ndarray,
-    shared: np.ndarray,
-    memory: np.ndarray,
-    decision: np.ndarray,
+    percept: Row,
+    shared: Row,
+    memory: Row,
+    decision: Row,
     masked: np.ndarray,
     safe: np.ndarray,
     safe_count: int,
@@ -258,7 +258,7 @@ def decide(
 
 
 @jit_inner
-def _watch_progress(memory: np.ndarray, goal: float, now: float, params: Params) -> None:
+def _watch_progress(memory: Row, goal: float, now: float, params: Params) -> None:
     """Notice a following that gets no closer to the goal for long: follow strictly, then on the other side."""
     if goal < memory["best"] - 0.3:
         memory["best"], memory["best_s"], memory["stuck_s"] = goal, now, params.stuck_s
@@ -273,7 +273,7 @@ def _watch_progress(memory: np.ndarray, goal: float, now: float, params: Params)
 
 
 @jit
-def wants_features(percept: np.ndarray, shared: np.ndarray, memory: np.ndarray, safe: np.ndarray, rig: Rig) -> bool:
+def wants_features(percept: Row, shared: Row, memory: Row, safe: np.ndarray, rig: Rig) -> bool:
     """Tell whether our own features are needed in this tick: somebody asked, or a side may have to be chosen."""
     if shared["ask_n"] > 0:
         return True
@@ -285,32 +285,33 @@ def wants_features(percept: np.ndarray, shared: np.ndarray, memory: np.ndarray, 
 
 
 @jit_inner
-def _say(decision: np.ndarray, memory: np.ndarray, state: int, reason: int) -> None:
+def _say(decision: Row, memory: Row, state: int, reason: int) -> None:
     """Note state and reason for people to read."""
     decision["state"], decision["reason"], decision["side"] = state, reason, memory["side"]
 
 
 @jit_inner
-def _may_leave(masked: np.ndarray, percept: np.ndarray, memory: np.ndarray, rig: Rig) -> bool:
+def _may_leave(masked: np.ndarray, percept: Row, memory: Row, rig: Rig) -> bool:
     """Tell whether a strict following may end: the way to the goal is seen free until closer than ever before."""
     in_sight = _nearest_in_sight(masked, percept, rig)
     return in_sight <= 0.0 or in_sight < memory["closest"] - LEAVE_GAIN
 
 
 @jit_inner
-def _nearest_in_sight(masked: np.ndarray, percept: np.ndarray, rig: Rig) -> float:
+def _nearest_in_sight(masked: np.ndarray, percept: Row, rig: Rig) -> float:
     """Return the goal distance [m] up to which the straight way to the goal is seen to be free."""
     sensor = rig.sensor
     goal = percept["goal_distance"]
     limit = min(goal, sensor.range_max)
-    return goal - corridor_length(
+    free = corridor_length(
         masked, sensor.range_min, rig.cos, rig.sin, percept["goal_bearing"], rig.footprint, limit
     )
+    return float(goal - free)
 
 
 @jit_inner
 def _request_ahead(
-    masked: np.ndarray, percept: np.ndarray, shared: np.ndarray, decision: np.ndarray, rig: Rig, params: Params
+    masked: np.ndarray, percept: Row, shared: Row, decision: Row, rig: Rig, params: Params
 ) -> None:
     """Ask the neighbours in the pass band for features when an obstacle nears the planning distance."""
     now = percept["now_s"]
@@ -331,7 +332,7 @@ def _request_ahead(
 
 
 @jit_inner
-def _ask_neighbours(percept: np.ndarray, shared: np.ndarray, decision: np.ndarray, rig: Rig) -> None:
+def _ask_neighbours(percept: Row, shared: Row, decision: Row, rig: Rig) -> None:
     """Start a round of requests to every neighbour seen now in the pass band (sigma_a, 3 sigma_a]."""
     start_round(percept, shared)
     sigma = rig.protection.sigma_a
@@ -345,10 +346,10 @@ def _ask_neighbours(percept: np.ndarray, shared: np.ndarray, decision: np.ndarra
 
 @jit_inner
 def _decide_side(
-    percept: np.ndarray,
-    shared: np.ndarray,
-    memory: np.ndarray,
-    decision: np.ndarray,
+    percept: Row,
+    shared: Row,
+    memory: Row,
+    decision: Row,
     rig: Rig,
     params: Params,
     safe: np.ndarray,
@@ -371,7 +372,17 @@ def _decide_side(
         return False
     bias = params.prior * (turn_to_safe(percept, safe, -1, rig) - turn_to_safe(percept, safe, 1, rig))
     side = choose_side(
-        percept, shared, decision, rig, params.w_i, bias, features[0], distances[0], max(0, count), features[1], distances[1]
+        percept,
+        shared,
+        decision,
+        rig,
+        params.w_i,
+        bias,
+        features[0],
+        distances[0],
+        max(0, count),
+        features[1],
+        distances[1],
     )
     memory["side"] = _break_loop(percept, shared, memory, params, side)
     _say(decision, memory, DECIDE, R_LOOP if memory["strict"] else (R_FUSED if decision["heard"] else R_ALONE))
@@ -381,7 +392,7 @@ def _decide_side(
 
 
 @jit_inner
-def _break_loop(percept: np.ndarray, shared: np.ndarray, memory: np.ndarray, params: Params, side: int) -> int:
+def _break_loop(percept: Row, shared: Row, memory: Row, params: Params, side: int) -> int:
     """Log the choice; when it repeats an earlier one without progress, follow strictly on that earlier side."""
     x, y, goal = shared["x"], shared["y"], percept["goal_distance"]
     known = min(LOG, memory["log_n"])
@@ -405,9 +416,9 @@ def _break_loop(percept: np.ndarray, shared: np.ndarray, memory: np.ndarray, par
 def _follow(
     ranges: np.ndarray,
     masked: np.ndarray,
-    percept: np.ndarray,
-    memory: np.ndarray,
-    decision: np.ndarray,
+    percept: Row,
+    memory: Row,
+    decision: Row,
     safe: np.ndarray,
     safe_count: int,
     narrow: np.ndarray,
@@ -460,8 +471,8 @@ def _follow(
 @jit_inner
 def _keep_turning(
     masked: np.ndarray,
-    percept: np.ndarray,
-    memory: np.ndarray,
+    percept: Row,
+    memory: Row,
     heading: float,
     narrow: np.ndarray,
     edges: np.ndarray,
@@ -486,7 +497,7 @@ def _keep_turning(
 def first_safe(
     safe: np.ndarray, start: float, side: int, angle_min: float, increment: float, beams: int, wraps: bool
 ) -> tuple[float, bool]:
-    """Return the first safe direction from ``start`` on ``side`` (+1 counter-clockwise), body frame, and whether any is.
+    """Return the first safe direction (body frame) from ``start`` on ``side`` (+1 left), and whether any is.
 
     (Nav-SCOPE 16): the safe direction closest to the target on the chosen side.
     """
@@ -504,7 +515,7 @@ def first_safe(
 
 
 @jit_inline
-def turn_to_safe(percept: np.ndarray, safe: np.ndarray, side: int, rig: Rig) -> float:
+def turn_to_safe(percept: Row, safe: np.ndarray, side: int, rig: Rig) -> float:
     """Return the turn [rad] from the target to the first safe direction on ``side``, pi when there is none."""
     sensor = rig.sensor
     heading, found = first_safe(
@@ -527,7 +538,7 @@ def away_from_nearest(ranges: np.ndarray, rig: Rig) -> float:
 
 @jit_inner
 def _yield(
-    percept: np.ndarray, shared: np.ndarray, memory: np.ndarray, decision: np.ndarray, rig: Rig, params: Params
+    percept: Row, shared: Row, memory: Row, decision: Row, rig: Rig, params: Params
 ) -> None:
     """State iv: wait for a neighbour whose repulsion outweighs our own propulsion (17), but not for ever."""
     now = percept["now_s"]
@@ -546,7 +557,7 @@ def _yield(
 
 @jit_inner
 def _must_wait(
-    percept: np.ndarray, shared: np.ndarray, decision: np.ndarray, rig: Rig, params: Params
+    percept: Row, shared: Row, decision: Row, rig: Rig, params: Params
 ) -> bool:
     """Tell whether (17) holds for a moving neighbour that goes before us.
 

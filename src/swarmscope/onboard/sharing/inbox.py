@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from swarmscope._jit import jit, jit_inline, jit_inner
-from swarmscope.onboard.percept import MAX_OUTBOX, PEERS, Rig
+from swarmscope.onboard.percept import MAX_OUTBOX, PEERS, Rig, Row
 from swarmscope.onboard.sharing.message import (
     KIND_REQUEST,
     OK,
@@ -23,7 +23,9 @@ from swarmscope.onboard.sharing.message import (
 
 
 @jit
-def read_inbox(percept: np.ndarray, shared: np.ndarray, rig: Rig, header: np.ndarray, angles: np.ndarray, distances: np.ndarray) -> None:
+def read_inbox(
+    percept: Row, shared: Row, rig: Rig, header: np.ndarray, angles: np.ndarray, distances: np.ndarray
+) -> None:
     """Take in this tick's packets: remember features heard and who asks for ours.
 
     ``header (5,) int64``, ``angles``, ``distances`` are scratch.
@@ -56,7 +58,7 @@ def read_inbox(percept: np.ndarray, shared: np.ndarray, rig: Rig, header: np.nda
 
 
 @jit_inner
-def _is_new(shared: np.ndarray, sender: int, seq: int) -> bool:
+def _is_new(shared: Row, sender: int, seq: int) -> bool:
     """Tell whether ``seq`` is newer than everything accepted from ``sender``, and note it."""
     slot = -1
     for p in range(PEERS):
@@ -75,7 +77,7 @@ def _is_new(shared: np.ndarray, sender: int, seq: int) -> bool:
 
 
 @jit_inner
-def _remember(shared: np.ndarray, sender: int, count: int, angles: np.ndarray, distances: np.ndarray) -> None:
+def _remember(shared: Row, sender: int, count: int, angles: np.ndarray, distances: np.ndarray) -> None:
     """Store the features of ``sender``, in its slot, a free one, or the oldest."""
     slot = -1
     oldest = 0
@@ -99,7 +101,7 @@ def _remember(shared: np.ndarray, sender: int, count: int, angles: np.ndarray, d
 
 
 @jit
-def start_round(percept: np.ndarray, shared: np.ndarray) -> None:
+def start_round(percept: Row, shared: Row) -> None:
     """Begin a new round of requests; answers to earlier rounds are stale from here on."""
     shared["seq"] = (shared["seq"] + 1) & 0xFFFF
     shared["asked_seq"] = shared["seq"]
@@ -109,7 +111,7 @@ def start_round(percept: np.ndarray, shared: np.ndarray) -> None:
 
 
 @jit
-def ask(percept: np.ndarray, shared: np.ndarray, decision: np.ndarray, peer: int) -> None:
+def ask(percept: Row, shared: Row, decision: Row, peer: int) -> None:
     """Put a request to ``peer`` of the current round into the outbox (left out when that is full)."""
     k = decision["n_out"]
     if k >= MAX_OUTBOX:
@@ -122,9 +124,9 @@ def ask(percept: np.ndarray, shared: np.ndarray, decision: np.ndarray, peer: int
 
 @jit
 def answer_all(
-    percept: np.ndarray,
-    shared: np.ndarray,
-    decision: np.ndarray,
+    percept: Row,
+    shared: Row,
+    decision: Row,
     rig: Rig,
     angles: np.ndarray,
     distances: np.ndarray,
@@ -158,6 +160,6 @@ def answer_all(
 
 
 @jit_inline
-def waiting_for_answers(percept: np.ndarray, shared: np.ndarray, patience: float) -> bool:
+def waiting_for_answers(percept: Row, shared: Row, patience: float) -> bool:
     """Tell whether answers to a round younger than ``patience`` [s] are still out."""
-    return shared["answers_n"] < shared["asked_n"] and percept["now_s"] - shared["asked_s"] < patience
+    return bool(shared["answers_n"] < shared["asked_n"] and percept["now_s"] - shared["asked_s"] < patience)

@@ -7,14 +7,14 @@ import math
 import numpy as np
 
 from swarmscope._jit import jit, jit_inline, jit_inner
-from swarmscope.onboard.percept import PEERS, Rig
+from swarmscope.onboard.percept import PEERS, Rig, Row
 
 STILL_RADIUS = 0.08
 """A neighbour that stays within this of one place stands still [m]."""
 
 
 @jit
-def update_odometry(percept: np.ndarray, shared: np.ndarray) -> tuple[float, float]:
+def update_odometry(percept: Row, shared: Row) -> tuple[float, float]:
     """Add this tick's odometry to the robot's own displacement; return it (compass frame) [m]."""
     if shared["started"] == 0:
         shared["started"] = 1
@@ -30,7 +30,7 @@ def update_odometry(percept: np.ndarray, shared: np.ndarray) -> tuple[float, flo
 
 
 @jit
-def update_tracks(percept: np.ndarray, shared: np.ndarray, rig: Rig, dx: float, dy: float) -> None:
+def update_tracks(percept: Row, shared: Row, rig: Rig, dx: float, dy: float) -> None:
     """Move every track on by dead reckoning, then correct it with what is observed now.
 
     An alpha-beta filter in the compass frame, relative to the robot; ``dx, dy`` [m] is its own motion. A
@@ -75,7 +75,7 @@ def update_tracks(percept: np.ndarray, shared: np.ndarray, rig: Rig, dx: float, 
 
 
 @jit_inner
-def _limit_speed_and_anchor(shared: np.ndarray, rig: Rig, now: float) -> None:
+def _limit_speed_and_anchor(shared: Row, rig: Rig, now: float) -> None:
     """Clip estimated speeds to what the robots can do, slow unseen ones down, notice who stands still."""
     for t in range(PEERS):
         if shared["track_id"][t] < 0:
@@ -98,7 +98,7 @@ def _limit_speed_and_anchor(shared: np.ndarray, rig: Rig, now: float) -> None:
 
 
 @jit_inner
-def _find(shared: np.ndarray, peer: int) -> int:
+def _find(shared: Row, peer: int) -> int:
     """Return the track of ``peer``, or -1."""
     for t in range(PEERS):
         if shared["track_id"][t] == peer:
@@ -107,7 +107,7 @@ def _find(shared: np.ndarray, peer: int) -> int:
 
 
 @jit_inner
-def _place(shared: np.ndarray, x: float, y: float) -> int:
+def _place(shared: Row, x: float, y: float) -> int:
     """Return a free track, else the farthest one if it is farther than (x, y), else -1."""
     worst, worst_d2 = -1, x * x + y * y
     for t in range(PEERS):
@@ -121,7 +121,7 @@ def _place(shared: np.ndarray, x: float, y: float) -> int:
 
 @jit
 def mask_moving_neighbours(
-    ranges: np.ndarray, percept: np.ndarray, shared: np.ndarray, rig: Rig, still_s: float, out: np.ndarray
+    ranges: np.ndarray, percept: Row, shared: Row, rig: Rig, still_s: float, out: np.ndarray
 ) -> None:
     """Copy the scan into ``out`` without the returns of neighbours that move (no return instead).
 
