@@ -94,7 +94,7 @@ MEMORY = np.dtype(
         ("last_side", np.int8),  # side of the last following
         ("best", np.float64),  # smallest goal distance so far [m]
         ("best_s", np.float64),  # when
-        ("closest", np.float64),  # goal distance of the nearest free point ever seen on the straight way to the goal [m]
+        ("closest", np.float64),  # goal distance of the nearest free point ever seen on the way to the goal [m]
         ("stuck_s", np.float64),  # how long without progress is a loop; doubles with every one in a row
         ("wait_s", np.float64),  # when the present wait began, -1 = none
         ("push_s", np.float64),  # until when waiting is not allowed
