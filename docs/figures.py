@@ -120,9 +120,7 @@ def protection() -> plt.Figure:
         (f"planning distance $l_{{th}}$ = {p.l_th:.2f} m", (0.62, 0.62), (0.574, 0.175)),
         (f"reference distance $\\sigma_a$ = {p.sigma_a:.2f} m", (0.55, -0.98), (0.55, -0.712)),
     ):
-        axes.annotate(
-            text, point, where, arrowprops={"arrowstyle": "-", "color": GREY}, va="center", bbox=box
-        )
+        axes.annotate(text, point, where, arrowprops={"arrowstyle": "-", "color": GREY}, va="center", bbox=box)
     for angle, name in ((9, "I"), (-9, "II"), (62, "III"), (-62, "IV")):
         a = math.radians(angle)
         axes.text(0.49 * math.cos(a), 0.49 * math.sin(a), name, ha="center", va="center", fontsize=12)
@@ -137,9 +135,7 @@ def protection() -> plt.Figure:
         va="center",
         bbox=box,
     )
-    axes.set(
-        xlim=(-1.45, 1.75), ylim=(-1.08, 1.08), xlabel="x forward [m]", ylabel="y left [m]", aspect="equal"
-    )
+    axes.set(xlim=(-1.45, 1.75), ylim=(-1.08, 1.08), xlabel="x forward [m]", ylabel="y left [m]", aspect="equal")
     return figure
 
 
@@ -151,9 +147,7 @@ def forest_scan() -> tuple[Rig, Rig, np.ndarray]:
     lidar = scenario.lidar
     world = compile_world(make_setup(scenario).world)
     ranges = np.full(lidar.beams, np.inf, np.float32)
-    cast_static(
-        world, *SCAN_POSE, make_beams(lidar.beams, math.radians(lidar.fov_deg), lidar.range_m), ranges
-    )
+    cast_static(world, *SCAN_POSE, make_beams(lidar.beams, math.radians(lidar.fov_deg), lidar.range_m), ranges)
     return make_rig_of(scenario), make_rig_of(printed), ranges
 
 
@@ -285,9 +279,7 @@ def field() -> plt.Figure:
     axes.axhline(0.193, color="#222222", lw=0.9, ls=":")
     axes.text(3.58, 0.2, "AdaBoost optimum 0.193 (21)", ha="right", va="bottom", fontsize=8.5)
     axes.set(xlim=(0.55, 3.6), ylim=(-1.0, 0.9), xlabel="distance to the neighbour [m]", ylabel="force [1/m]")
-    axes.set_xticks(
-        [sigma, 2 * sigma, 3 * sigma], ["$\\sigma_a$ = 0.9", "$2\\sigma_a$ = 1.8", "$3\\sigma_a$ = 2.7"]
-    )
+    axes.set_xticks([sigma, 2 * sigma, 3 * sigma], ["$\\sigma_a$ = 0.9", "$2\\sigma_a$ = 1.8", "$3\\sigma_a$ = 2.7"])
     axes.legend(loc="lower right", frameon=False)
     return figure
 
@@ -336,9 +328,7 @@ def decision() -> plt.Figure:
                     va="center",
                     fontsize=11,
                 )
-            ax.plot(
-                np.radians(np.linspace(-degrees, degrees, 60)), np.full(60, 1.54), color=RED, lw=1.2, ls="--"
-            )
+            ax.plot(np.radians(np.linspace(-degrees, degrees, 60)), np.full(60, 1.54), color=RED, lw=1.2, ls="--")
         ax.set_theta_zero_location("N")
         ax.set_rlim(0, 2.0)
         ax.set_rticks([1.0, 1.5, 2.0])
