@@ -270,4 +270,5 @@ def _in_words(value: Any, unit: str) -> str:
         return f"{100.0 * value:.1f} %"
     if isinstance(value, int):
         return f"{value:,} {unit}".replace(",", "\u202f").strip()
-    return f"{value:.3g} {unit}".strip() if abs(value) < 10.0 else f"{value:.1f} {unit}".strip()
+    digits = 3 if unit == "m" and abs(value) < 1.0 else 1
+    return f"{value:.{digits}f} {unit}".strip()

@@ -1,0 +1,144 @@
+"""The path picture and what its reader refuses."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fake_run import make_fake_run
+from PIL import Image
+
+from swarmscope.errors import InputFileError
+from swarmscope.viewing.pictures import write_picture
+from swarmscope.viewing.run_data import crash_ticks, decision_ticks, headline, load_run, summary_rows
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    return make_fake_run(tmp_path / "run", crashed=4)
+
+
+def rewrite_arrays(folder: Path, **changes: np.ndarray) -> None:
+    with np.load(folder / "trajectory.npz") as archive:
+        arrays = dict(archive)
+    np.savez_compressed(folder / "trajectory.npz", **(arrays | changes))
+
+
+def test_picture_shows_obstacles_paths_and_the_crash(folder: Path) -> None:
+    path = write_picture(folder)
+    assert path == folder / "paths.png"
+    picture = Image.open(path)
+    pixels = np.asarray(picture.convert("RGB")).reshape(-1, 3)
+    assert picture.width > 900 and picture.height > 600
+    for colour in ((0xC9, 0xD2, 0xC4), (0xC2, 0x3B, 0x22), (0xFB, 0xFA, 0xF7)):
+        assert np.count_nonzero(np.all(pixels == colour, axis=1)) > 30, colour
+    dark_blue_path = np.all(np.abs(pixels - np.array([36.0, 24.0, 145.0])) < 30, axis=1)
+    assert np.count_nonzero(dark_blue_path) > 500
+
+
+def test_picture_is_byte_reproducible_and_names_no_software(folder: Path) -> None:
+    first = write_picture(folder).read_bytes()
+    assert write_picture(folder).read_bytes() == first
+    assert b"matplotlib" not in first and b"tEXt" not in first
+
+
+def test_picture_leaves_matplotlib_settings_alone(folder: Path) -> None:
+    import matplotlib as mpl
+
+    with mpl.rc_context({"font.size": 33.0, "axes.facecolor": "red"}):
+        strange = write_picture(folder).read_bytes()
+        assert mpl.rcParams["font.size"] == 33.0
+    assert write_picture(folder).read_bytes() == strange
+
+
+def test_no_half_written_files_stay(folder: Path) -> None:
+    before = {entry.name for entry in folder.iterdir()}
+    write_picture(folder)
+    assert {entry.name for entry in folder.iterdir()} == before | {"paths.png"}
+
+
+def test_decisions_are_where_p_left_changes(folder: Path) -> None:
+    trajectory = load_run(folder).trajectory
+    for robot in range(6):
+        chosen = decision_ticks(trajectory, robot)
+        assert list(chosen) == list(np.flatnonzero(trajectory.state[:, robot] == 1))
+
+
+def test_crash_is_dated_by_state_and_else_by_the_last_step(folder: Path) -> None:
+    assert crash_ticks(load_run(folder).trajectory).tolist() == [60, 60, 60, 60, 30, 60]
+    rewrite_arrays(folder, state_names=np.array(["a", "b", "c", "d", "e", "f", "g"]))
+    assert crash_ticks(load_run(folder).trajectory).tolist() == [60, 60, 60, 60, 30, 60]
+
+
+def test_words_with_and_without_figures(folder: Path) -> None:
+    run = load_run(folder)
+    assert headline(run) == "T1 · nav-scope · 6 robots · seed 7"
+    assert dict(summary_rows(run))["Path redundancy γ"] == "8.3 %"
+    (folder / "metrics.json").write_text("{}")
+    bare = load_run(folder)
+    assert headline(bare) == "6 robots"
+    assert dict(summary_rows(bare)) == {"Arrived (AR)": "83.3 %", "Collisions": "1", "Last arrival": "22.0 s"}
+    write_picture(folder)
+
+
+def test_a_figure_without_a_value_is_a_dash(folder: Path) -> None:
+    (folder / "metrics.json").write_text(json.dumps({"path_redundancy": None, "spl": float("nan")}))
+    rows = dict(summary_rows(load_run(folder)))
+    assert rows["Path redundancy γ"] == rows["SPL"] == "–"
+
+
+@pytest.mark.parametrize("name", ["world.json", "trajectory.npz", "metrics.json"])
+@pytest.mark.parametrize("damage", ["missing", "empty", "torn", "foreign"])
+def test_damaged_files_are_named(folder: Path, name: str, damage: str) -> None:
+    path = folder / name
+    content = path.read_bytes()
+    if damage == "missing":
+        path.unlink()
+    else:
+        path.write_bytes({"empty": b"", "torn": content[: len(content) // 2], "foreign": b"[1, 2]"}[damage])
+    with pytest.raises(InputFileError) as caught:
+        write_picture(folder)
+    assert name in str(caught.value)
+    assert not (folder / "paths.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"x_m": np.zeros((60, 5))}, "x_m"),
+        ({"y_m": np.full((60, 6), np.nan)}, "y_m"),
+        ({"t_s": np.zeros(60)}, "t_s"),
+        ({"state": np.full((60, 6), 7, np.uint8)}, "state_names"),
+        ({"links": np.array([[0, 6, 1, 20]])}, "links"),
+        ({"scan_u8": np.zeros((60, 6, 71), np.uint8)}, "scan_u8"),
+        ({"state": np.full((60, 6), "advance")}, "state"),
+    ],
+)
+def test_arrays_that_do_not_fit_are_named(folder: Path, changes: dict[str, np.ndarray], words: str) -> None:
+    rewrite_arrays(folder, **changes)
+    with pytest.raises(InputFileError, match=words):
+        load_run(folder)
+
+
+def test_pickled_arrays_are_refused(folder: Path) -> None:
+    rewrite_arrays(folder, x_m=np.array([{"a": 1}], dtype=object))
+    with pytest.raises(InputFileError, match=r"trajectory\.npz"):
+        load_run(folder)
+
+
+def test_a_world_for_other_robots_is_refused(folder: Path) -> None:
+    world = json.loads((folder / "world.json").read_text())
+    world["robots"].pop()
+    (folder / "world.json").write_text(json.dumps(world))
+    with pytest.raises(InputFileError, match="5 robots"):
+        load_run(folder)
+
+
+def test_a_wrong_obstacle_is_named(folder: Path) -> None:
+    world = json.loads((folder / "world.json").read_text())
+    world["obstacles"][3]["radius"] = -1
+    (folder / "world.json").write_text(json.dumps(world))
+    with pytest.raises(InputFileError, match=r"world\.json: obstacles\.3"):
+        load_run(folder)
