@@ -150,6 +150,7 @@ def main() -> None:
     rows = run_all(options.tasks, seeds, changes, options.any_angle, options.workers, "ours")
     for task in options.tasks:
         summarise(task, [r for r in rows if r["task"] == task])
+    others: list[dict[str, Any]] = []
     if options.against:
         others = run_all(options.tasks, seeds, (*changes, options.against), False, options.workers, "other")
         print(f"with {options.against}")
@@ -159,7 +160,8 @@ def main() -> None:
             compare(task, mine, theirs, options.against)
     if options.out:
         about = {"changes": changes, "seeds": options.seeds, "versions": versions(), "git": git_revision()}
-        options.out.write_text(json.dumps({"about": about, "runs": rows}, indent=1) + "\n")
+        table = {"about": about, "runs": rows, "against": {"change": options.against, "runs": others}}
+        options.out.write_text(json.dumps(table, indent=1) + "\n")
 
 
 if __name__ == "__main__":

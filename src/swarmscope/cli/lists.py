@@ -6,9 +6,9 @@ import ast
 import inspect
 from types import ModuleType
 
-from rich.console import Console
 from rich.table import Table
 
+from swarmscope.cli._console import PlainConsole
 from swarmscope.evaluation.scenario import task_options
 from swarmscope.onboard.planning._contract import load_planner, planner_names
 from swarmscope.tasks import load_task, task_names
@@ -16,7 +16,7 @@ from swarmscope.tasks import load_task, task_names
 
 def list_planners() -> None:
     """Print every planner with what it is given and its parameters."""
-    console = Console()
+    console = PlainConsole()
     for name in planner_names():
         module = load_planner(name)
         console.print(f"[bold]{name}[/bold]  {module.SUMMARY.removeprefix(f'{name}: ')}")
@@ -34,7 +34,7 @@ def list_tasks() -> None:
         task = load_task(name)
         options = " ".join(f"{key}={value:g}" for key, value in task_options(task).items())
         table.add_row(name, task.SUMMARY, options)
-    Console().print(table)
+    PlainConsole().print(table)
     print("Example of an option: swarmscope run --task T1 --set task.options.density=0.2")
 
 

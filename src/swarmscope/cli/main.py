@@ -49,9 +49,7 @@ def run(
     map_: Annotated[
         str | None, typer.Option("--map", help="map_server YAML of a building, or a packaged map by name.")
     ] = None,
-    planner: Annotated[
-        str | None, typer.Option(help="Planner (see 'swarmscope planners'), else nav-scope.")
-    ] = None,
+    planner: Annotated[str | None, typer.Option(help="Planner (see 'swarmscope planners'), else nav-scope.")] = None,
     robots: Annotated[int | None, typer.Option(help="Number of robots, else 15.")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of world and noise, else 0.")] = None,
     limit: Annotated[float | None, typer.Option(help="Time limit, simulated seconds, else 300.")] = None,
@@ -70,9 +68,7 @@ def run(
     run_command(scenario, task, map_, planner, options, set_ or [], out, threads, pictures)
 
 
-@app.command(
-    epilog="Example: [bold]swarmscope perceive malaga_telecom_2006_sick_lms --out runs/perceive[/bold]"
-)
+@app.command(epilog="Example: [bold]swarmscope perceive malaga_telecom_2006_sick_lms --out runs/perceive[/bold]")
 def perceive(
     scans: Annotated[str, typer.Argument(help="Scan file (.npz or .csv), or the name of a packaged one.")],
     out: Annotated[Path | None, typer.Option(help="Folder for features.csv and perceive.png.")] = None,

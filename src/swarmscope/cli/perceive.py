@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from rich.console import Console
 from rich.table import Table
 
+from swarmscope.cli._console import PlainConsole
 from swarmscope.errors import UnknownNameError
 from swarmscope.evaluation.perceive import Perception, perceive, write_features
 from swarmscope.sim.scan_files import ScanLog, load_scans
@@ -15,9 +15,7 @@ from swarmscope.sim.scan_files import ScanLog, load_scans
 SCAN_FOLDER = Path(__file__).parent.parent / "data" / "scans"
 
 
-def perceive_command(
-    scans: str, out: Path | None, range_m: float, radius_m: float, beam_step: int = 1
-) -> None:
+def perceive_command(scans: str, out: Path | None, range_m: float, radius_m: float, beam_step: int = 1) -> None:
     """Print what a robot makes of recorded scans; with ``out`` write features and a picture there."""
     log = load_scans(scan_file(scans))
     seen = perceive(log, range_m, radius_m, beam_step)
@@ -51,18 +49,16 @@ def _print_table(log: ScanLog, seen: Perception) -> None:
     fov = np.degrees(seen.rig.sensor.increment * (beams if seen.rig.sensor.wraps else beams - 1))
     safe = seen.safe.sum(axis=1)
     found = np.array([len(pairs) for pairs in seen.features])
-    table = Table(
-        title=f"{log.name} · {scans} scans of {beams} beams over {fov:.0f} degrees", show_header=False
-    )
+    table = Table(title=log.name, show_header=False)
     table.add_column(style="bold")
     table.add_column(justify="right")
+    table.add_row("scans", f"{scans}")
+    table.add_row("beams of a scan", f"{beams} over {fov:.0f} degrees")
     table.add_row("range used", f"{seen.rig.sensor.range_max:g} m")
     table.add_row("safe directions, mean per scan", f"{safe.mean():.1f} of {beams}")
     table.add_row("scans without any", f"{int((safe == 0).sum())}")
     table.add_row("features, mean and most", f"{found.mean():.1f}, {found.max()}")
-    table.add_row(
-        "message, mean and most", f"{seen.packet_bytes.mean():.1f}, {seen.packet_bytes.max()} bytes"
-    )
+    table.add_row("message, mean and most", f"{seen.packet_bytes.mean():.1f}, {seen.packet_bytes.max()} bytes")
     for percent, words in ((50, "median"), (99, "99 %")):
         table.add_row(f"time of a scan, {words}", f"{np.percentile(seen.us, percent):.2f} us")
-    Console().print(table)
+    PlainConsole().print(table)

@@ -14,6 +14,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from swarmscope.cli._console import PlainConsole
 from swarmscope.errors import ConfigError
 from swarmscope.evaluation.run_folder import check_out
 from swarmscope.evaluation.runner import place_name, run_scenario
@@ -60,7 +61,7 @@ def run_command(
         print("compiling the kernels for the first time (about 40 s, kept on disk) ...", file=sys.stderr)
     with progress_bar(scenario) as progress:
         metrics = run_scenario(scenario, place, threads, progress, add_pictures if pictures else None)
-    print_metrics(Console(), metrics)
+    print_metrics(PlainConsole(), metrics)
     print_failures(metrics["failures"])
     for name in ("paths.png", "replay.html") if pictures else ("metrics.json",):
         print(place / name)

@@ -167,10 +167,12 @@ def read_scenario_file(path: Path) -> dict[str, Any]:
     """Return the mapping in YAML file ``path``, not validated yet; a map file is looked for beside it."""
     try:
         values = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputFileError(path, f"cannot be read ({error})") from None
-    except yaml.YAMLError as error:
-        raise InputFileError(path, f"is not YAML ({str(error).splitlines()[0]})") from None
+    except UnicodeDecodeError:
+        raise InputFileError(path, "is not text") from None
+    except OSError as error:
+        raise InputFileError(path, f"cannot be read ({error.strerror})") from None
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        raise InputFileError(path, f"is not YAML ({' '.join(str(error).split())})") from None
     if not isinstance(values, dict):
         raise ConfigError(str(path), "a scenario is a mapping of keys to values")
     place = values.get("map")
