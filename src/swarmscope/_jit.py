@@ -8,13 +8,54 @@ because a kernel writes only to its own robots' rows.
 
 from __future__ import annotations
 
+import hashlib
+import os
+import shutil
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
 
 F = TypeVar("F", bound=Callable[..., Any])
 
+
+PACKAGE = Path(__file__).parent
+KEPT_CACHES = 4
+"""Kernel caches of earlier states of the sources that are left on disk."""
+
+
+def cache_folder() -> Path:
+    """Return the folder for the kernels of this state of the sources, in the user's cache.
+
+    Numba compiles a cached kernel anew when its own file has changed, but not when a function that it calls
+    from another file has; a folder for each state of all sources rules out results of mixed versions.
+    """
+    state = hashlib.sha256()
+    for file in sorted(PACKAGE.rglob("*.py")):
+        state.update(file.relative_to(PACKAGE).as_posix().encode() + file.read_bytes())
+    root = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    return root / "swarmscope" / "kernels" / state.hexdigest()[:16]
+
+
+def use_own_cache() -> None:
+    """Keep kernels in ``cache_folder`` unless NUMBA_CACHE_DIR says where; forget the oldest others."""
+    if os.environ.get("NUMBA_CACHE_DIR"):
+        return
+    try:
+        folder = cache_folder()
+        folder.mkdir(parents=True, exist_ok=True)
+        folder.touch()
+        others = sorted(folder.parent.iterdir(), key=lambda other: other.stat().st_mtime, reverse=True)
+    except (OSError, RuntimeError):
+        return  # no home, or no room: Numba finds a place of its own
+    for other in others[KEPT_CACHES:]:
+        shutil.rmtree(other, ignore_errors=True)
+    config: Any = numba.config
+    config.CACHE_DIR = str(folder)
+
+
+use_own_cache()
 
 OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 LEAN = OPTIONS | {"_nrt": False, "no_cfunc_wrapper": True}
