@@ -37,9 +37,11 @@ def common(
 
 
 @app.command(
-    epilog="Examples: [bold]swarmscope run --task T3 --seed 4 --set planner.params.w_i=0[/bold] · "
-    "[bold]swarmscope run examples/noisy_radio.yaml[/bold] · "
-    "[bold]swarmscope run --map willow_garage_office --robots 5[/bold]"
+    epilog="Examples:\n\n"
+    "[bold]swarmscope run --task T3 --seed 4 --set planner.params.w_i=0[/bold]\n\n"
+    "[bold]swarmscope run examples/noisy_radio.yaml[/bold]\n\n"
+    "[bold]swarmscope run --map willow_garage_office --robots 5 --seed 23[/bold]\n\n"
+    "[bold]swarmscope run runs/first/config.yaml --out runs/again[/bold]"
 )
 def run(
     scenario: Annotated[
@@ -72,8 +74,8 @@ def run(
 def perceive(
     scans: Annotated[str, typer.Argument(help="Scan file (.npz or .csv), or the name of a packaged one.")],
     out: Annotated[Path | None, typer.Option(help="Folder for features.csv and perceive.png.")] = None,
-    range_m: Annotated[float, typer.Option("--range", help="Range that the robots use [m].")] = 5.0,
-    radius_m: Annotated[float, typer.Option("--radius", help="The robot's radius [m].")] = 0.15,
+    range_m: Annotated[float, typer.Option("--range", help="Range that the robots use, metres.")] = 5.0,
+    radius_m: Annotated[float, typer.Option("--radius", help="The robot's radius, metres.")] = 0.15,
     beam_step: Annotated[int, typer.Option(min=1, help="Use every so manieth beam.")] = 1,
 ) -> None:
     """Safe directions and features of recorded scans, with the time that they take."""
@@ -116,4 +118,4 @@ def tasks() -> None:
 
 def main() -> None:
     """Run the command line."""
-    app()
+    app(prog_name="swarmscope")
