@@ -151,11 +151,11 @@ def forest_scan() -> tuple[Rig, Rig, np.ndarray]:
     return make_rig_of(scenario), make_rig_of(printed), ranges
 
 
-def safe_of(rig: Rig, ranges: np.ndarray) -> np.ndarray:
-    """Return the safe directions of a scan as booleans."""
+def safe_of(rig: Rig, ranges: np.ndarray, rule: int = 0) -> np.ndarray:
+    """Return the safe directions of a scan as booleans; rule 3 is the printed one that masks the features."""
     sensor = rig.sensor
     edges, safe = np.zeros(ranges.size + 1, np.int16), np.zeros(ranges.size, np.uint8)
-    safe_directions(ranges, sensor.range_min, sensor.range_max, sensor.wraps, rig.reach[0], edges, safe)
+    safe_directions(ranges, sensor.range_min, sensor.range_max, sensor.wraps, rig.reach[rule], edges, safe)
     return safe.astype(bool)
 
 
@@ -215,7 +215,7 @@ def scan() -> plt.Figure:
         reach = which.look_ahead if which.look_ahead > 0 else which.protection.l_th
         ax.plot(np.linspace(0, 2 * math.pi, 200), np.full(200, reach), color=RED, lw=1.1, ls="--")
         ax.set_title(f"{title}\n{safe.sum()} of {safe.size} directions", fontsize=10.5)
-    filtered, at, distance = features_of(rig, ranges, safe_default)
+    filtered, at, distance = features_of(rig, ranges, safe_of(rig, ranges, 3))
     ax = axes[2]
     ax.plot(circle, np.append(filtered, filtered[0]), color=BLUE, lw=1.8, label="filtered scan $y_2$")
     loop = np.append(at, at[0] + 2 * math.pi)

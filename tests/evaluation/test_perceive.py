@@ -76,7 +76,7 @@ def test_it_is_what_the_robots_kernels_say(forest_scans):
             scan, sensor.range_min, sensor.range_max, sensor.wraps, rig.reach[0], scratch.edges[0], scratch.safe[0]
         )
         rows = (scratch.padded[0], scratch.angles[0], scratch.distances[0], scratch.filtered[0])
-        count = features(scan, percept[0], scratch.safe[0], *rows, rig)
+        count = features(scan, percept[0], scratch.edges[0], scratch.narrow[0], *rows, rig)
         assert np.array_equal(seen.safe[k], scratch.safe[0] == 1)
         assert len(seen.features[k]) == count > 0
         assert np.allclose(seen.features[k][:, 1], scratch.distances[0, 0, :count])

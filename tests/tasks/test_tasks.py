@@ -22,7 +22,7 @@ def setup_of(obstacles: list, starts: list, goals: list) -> Setup:
 
 
 def test_names_come_from_the_folder() -> None:
-    assert set(TASKS) == {"swap", "T1", "T2", "T3"}
+    assert set(TASKS) >= {"swap", "T1", "T2", "T3"}
     assert all(name == load_task(name).NAME and load_task(name.lower()).SUMMARY for name in TASKS)
 
 

@@ -99,7 +99,8 @@ def perceive_repeatedly(
         count = features(
             ranges,
             percepts[0],
-            scratch.safe[0],
+            scratch.edges[0],
+            scratch.narrow[0],
             scratch.padded[0],
             scratch.angles[0],
             scratch.distances[0],

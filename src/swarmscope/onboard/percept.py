@@ -151,7 +151,8 @@ class Rig(NamedTuple):
     look_ahead: float
     """Directions are free of obstacles up to here [m]."""
     reach: np.ndarray
-    """(3, BINS + 2) int16: what a return blocks, for the safe directions, the narrow gaps and the escape."""
+    """(4, BINS + 2) int16: what a return blocks, for the safe directions, the narrow gaps, the escape, and by the
+    printed rule (3), which masks the features."""
     cos: np.ndarray
     sin: np.ndarray
     taps: np.ndarray
@@ -209,6 +210,7 @@ def make_rig(
         (protection.l_th, half_alpha, look_ahead, body.radius + margin),
         (narrow or protection.r, 0.0, 0.0, 0.0),
         (protection.r, 0.0, 0.0, 0.0),
+        (protection.l_th, 0.5 * protection.alpha, 0.0, 0.0),
     )
     reach = np.stack([reach_table(sensor.increment, sensor.range_max, footprint, *rule) for rule in rules])
     return Rig(

@@ -49,20 +49,25 @@ def begin(
 def features(
     work: np.ndarray,
     percept: Row,
-    safe: np.ndarray,
+    edges: np.ndarray,
+    mask: np.ndarray,
     padded: np.ndarray,
     angles: np.ndarray,
     distances: np.ndarray,
     filtered: np.ndarray,
     rig: Rig,
 ) -> int:
-    """Compute our features (7) of the scan ``work`` into row 0, compass frame; return how many."""
+    """Compute our features (7) of the scan ``work`` into row 0, compass frame; return how many.
+
+    ``edges``, ``mask (M,)`` are scratch. The mask is the printed rule (3): the look-ahead would hide whatever is near.
+    """
     sensor = rig.sensor
+    safe_directions(work, sensor.range_min, sensor.range_max, sensor.wraps, rig.reach[3], edges, mask)
     prepare_scan(work, sensor.range_min, sensor.range_max, sensor.wraps, rig.half, padded)
     filter_padded(padded, rig.taps, sensor.range_max, filtered)
     count = extrema(
         filtered,
-        safe,
+        mask,
         sensor.angle_min,
         sensor.increment,
         sensor.wraps,

@@ -197,8 +197,8 @@ def _clear_of_tracks(
 
 @jit
 def halt(decision: Row) -> None:
-    """Ask for standing still."""
-    decision["v"], decision["w"] = 0.0, 0.0
+    """Ask for standing still, headed as we are."""
+    decision["heading"], decision["v"], decision["w"] = 0.0, 0.0, 0.0
 
 
 @jit

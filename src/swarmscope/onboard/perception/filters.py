@@ -14,7 +14,7 @@ from swarmscope._jit import jit
 
 KAISER_BETA = 2.5
 """Kaiser parameter of (6), printed nowhere. See docs/theory.md: with one main lobe (T_c + 1 taps) the taps stay
-positive, so that no beta overshoots; 2.5 is the smallest whose first side lobe lies below -30 dB."""
+positive, so that no beta overshoots; 2.5 brings the response to about half at f_c. A convention, not an optimum."""
 
 
 def window_half(alpha: float, increment: float) -> int:

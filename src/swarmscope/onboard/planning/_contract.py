@@ -1,6 +1,6 @@
 """What a planner file defines, the states and reasons that planners share, and how planners are found.
 
-A planner is one file of this folder (or an entry point of group ``swarmscope.planners``) that defines ``NAME``,
+A planner is one file of this folder that defines ``NAME``,
 ``SUMMARY``, ``NEEDS`` (what it is given), ``Params`` (a NamedTuple with defaults), ``MEMORY`` (a dtype),
 ``new_memory(robots)`` and ``step_all(first, last, ...)`` (see ``nav_scope``): the compiled loop that calls
 ``tick.begin``, the planner's own ``decide`` and ``tick.finish`` for each robot.

@@ -150,7 +150,15 @@ def step(
     count = -1
     if wants_features(percept, shared, memory, safe, rig):
         count = features(
-            work, percept, safe, scratch.padded[row], angles, distances, scratch.filtered[row], rig
+            work,
+            percept,
+            edges,
+            scratch.narrow[row],
+            scratch.padded[row],
+            angles,
+            distances,
+            scratch.filtered[row],
+            rig,
         )
     if shared["ask_n"] > 0:
         answer_all(percept, shared, decision, rig, angles[0], distances[0], count)
@@ -180,7 +188,7 @@ def step_all(
     last: int,
     ranges: np.ndarray,
     percepts: np.ndarray,
-    shared: Row,
+    shared: np.ndarray,
     memories: np.ndarray,
     decisions: np.ndarray,
     scratch: Scratch,
