@@ -362,3 +362,11 @@ def test_two_writers_of_one_place_do_not_disturb_each_other(tmp_path: Path) -> N
         assert writer.communicate(timeout=60)[1] == b""
     assert _check_visible(out) == 40
     assert _hidden(tmp_path) == []
+
+
+def test_leftovers_of_a_killed_replay_do_not_make_a_folder_foreign(tmp_path: Path) -> None:
+    out = _write(tmp_path / "run", 1)
+    (out / ".paths.png.4711.tmp").write_bytes(b"half a picture")
+    _write(tmp_path / "run", 2)
+    assert read_metrics(out) == {"number": 2}
+    assert {entry.name for entry in out.iterdir()} == REQUIRED

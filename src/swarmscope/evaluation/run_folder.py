@@ -30,6 +30,8 @@ CONFIG, WORLD, TRAJECTORY, METRICS = "config.yaml", "world.json", "trajectory.np
 REQUIRED = frozenset({CONFIG, WORLD, TRAJECTORY, METRICS})
 RUN_FILES = REQUIRED | {"paths.png", "replay.html"}
 YAML_END = "...\n"
+LEFTOVER = re.compile(r"\..+\.\d+\.tmp")
+"""What a killed ``swarmscope replay`` may leave in a run folder."""
 
 
 def write_run(
@@ -115,7 +117,7 @@ def _refuse_foreign(place: Path) -> None:
         return
     if not place.is_dir():
         raise ConfigError(str(place), "is a file; a run is written into a folder of its own")
-    names = {entry.name for entry in place.iterdir()}
+    names = {entry.name for entry in place.iterdir() if not LEFTOVER.fullmatch(entry.name)}
     foreign = sorted(names - RUN_FILES)
     if foreign:
         raise ConfigError(
@@ -267,7 +269,7 @@ def _finished(run_dir: Path) -> Path:
             folder, "is a file, not a run folder" if folder.exists() else "no such run folder"
         )
     if not (folder / METRICS).is_file():
-        raise InputFileError(folder, f"no finished run: it has no {METRICS}, which is written last")
+        raise InputFileError(folder, f"no finished run: it has no {METRICS}")
     for name in sorted(REQUIRED):
         path = folder / name
         if not path.is_file() or path.stat().st_size == 0:

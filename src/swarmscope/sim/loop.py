@@ -64,6 +64,7 @@ class Trace:
     plan_us: np.ndarray
     """Time of single planning steps [us], sampled over the run; measured, so not part of the deterministic bytes."""
     wall_s: float
+    """Time of the run but for its first tick, which loads the kernels [s]."""
     memory_bytes: int
     """Planner memory of one robot, everything that its kernels read and write but the packets' way in and out."""
 
@@ -158,7 +159,7 @@ def run(setting: Setting, progress: Callable[[float, int], None] | None = None) 
         row = tick % CHUNK
         if row == 0:
             chunks.append(new_records(min(CHUNK, ticks - tick), n, beams))
-        if tick % sample_every == 0 and pool.size == 1:
+        if tick % sample_every == 0:
             plan_us += _time_steps(step_all, arguments, n)
         else:
             pool.each(lambda a, b: step_all(a, b, *arguments))
@@ -172,6 +173,8 @@ def run(setting: Setting, progress: Callable[[float, int], None] | None = None) 
             if not done:
                 pool.each(partial(sense, sim, tick + 1))
         tick += 1
+        if tick == 1:
+            begun = time.perf_counter()  # the first tick loads, or compiles, the kernels
         if progress is not None and tick % 50 == 0:
             progress(tick * setting.dt, int((sim.robots["arrived"] | sim.robots["crashed"]).sum()))
     pool.close()
