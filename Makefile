@@ -11,9 +11,8 @@ PIP   := $(BIN)/python -m pip --disable-pip-version-check --no-input
 ADD   := $(PIP) install --quiet --no-deps --no-compile
 CODE  := src tests benchmarks examples
 
-# One folder of compiled kernels per state of src/: Numba refreshes a cached kernel when its own file changes,
-# but not when a function that it calls from another file does. tests/conftest.py computes the same name.
-export NUMBA_CACHE_DIR = $(CURDIR)/.numba_cache/$(shell cd src && find . -name '*.py' | LC_ALL=C sort | xargs sha256sum | sha256sum | cut -c1-16)
+# Compiled kernels stay in the clone (one folder for each state of the sources, see src/swarmscope/_jit.py).
+export SWARMSCOPE_CACHE = $(CURDIR)/.numba_cache
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:

@@ -21,21 +21,29 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 PACKAGE = Path(__file__).parent
-KEPT_CACHES = 4
+NO_KERNELS = frozenset({"cli", "viewing", "evaluation"})
+"""Parts without kernels; the few files of theirs that have some import this module and are found by that."""
+KEPT_CACHES = 8
 """Kernel caches of earlier states of the sources that are left on disk."""
 
 
+def kernel_sources() -> list[Path]:
+    """Return the files that can change what a kernel does."""
+    files = sorted(PACKAGE.rglob("*.py"))
+    return [f for f in files if f.relative_to(PACKAGE).parts[0] not in NO_KERNELS or b"_jit import" in f.read_bytes()]
+
+
 def cache_folder() -> Path:
-    """Return the folder for the kernels of this state of the sources, in the user's cache.
+    """Return the folder for the kernels of this state of the sources, in SWARMSCOPE_CACHE or the user's cache.
 
     Numba compiles a cached kernel anew when its own file has changed, but not when a function that it calls
-    from another file has; a folder for each state of all sources rules out results of mixed versions.
+    from another file does; a folder for each state of the sources rules out results of mixed versions.
     """
     state = hashlib.sha256()
-    for file in sorted(PACKAGE.rglob("*.py")):
+    for file in kernel_sources():
         state.update(file.relative_to(PACKAGE).as_posix().encode() + file.read_bytes())
-    root = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    return root / "swarmscope" / "kernels" / state.hexdigest()[:16]
+    user = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "swarmscope"
+    return Path(os.environ.get("SWARMSCOPE_CACHE") or user) / "kernels" / state.hexdigest()[:16]
 
 
 def use_own_cache() -> None:

@@ -45,8 +45,11 @@ PERCEPT = np.dtype(
         ("n_packets", np.int64),
         ("packet_length", np.int64, MAX_INBOX),
         ("packet", np.uint8, (MAX_INBOX, MAX_PACKET_BYTES)),
+        ("told_side", np.int8),  # side that the shortest way takes, +1 left, -1 right: oracles only, 0 on a robot
     ]
 )
+PEERS = 10
+"""Neighbours that are remembered at once."""
 
 DECISION = np.dtype(
     [
@@ -59,6 +62,10 @@ DECISION = np.dtype(
         ("heard", np.uint8),  # neighbours whose features entered that choice
         ("p_self", np.float64),  # P_a (9), NaN before the first choice
         ("p_left", np.float64),  # P_dir (15), NaN before the first choice
+        ("heard_id", np.int64, PEERS),  # those neighbours, their P_ni (14) and f_ai (12)
+        ("heard_p", np.float64, PEERS),
+        ("heard_f", np.float64, PEERS),
+        ("heard_side", np.int8, PEERS),  # +1 on the left of the target direction, -1 on the right
         ("heading", np.float64),  # direction wanted, body frame [rad]
         ("n_out", np.int64),
         ("out_to", np.int64, MAX_OUTBOX),
@@ -66,9 +73,6 @@ DECISION = np.dtype(
         ("out", np.uint8, (MAX_OUTBOX, MAX_PACKET_BYTES)),
     ]
 )
-
-PEERS = 10
-"""Neighbours that are remembered at once."""
 
 SHARED = np.dtype(
     [

@@ -79,8 +79,12 @@ def choose_side(
         x_1 = passable_distance(out_angles, out_distances, n, 0.0, half_alpha, False)
         x_2 = passable_distance(out_angles, out_distances, n, -half_alpha, 0.0, False)
         force = interaction_force(distance, rig.protection.sigma_a, w_i)
-        weighted += force * following_probability(x_1, x_2, threshold, bearing >= 0.0)
+        follow = following_probability(x_1, x_2, threshold, bearing >= 0.0)
+        weighted += force * follow
         weights += force
+        decision["heard_id"][heard] = shared["track_id"][t]
+        decision["heard_p"][heard], decision["heard_f"][heard] = follow, force
+        decision["heard_side"][heard] = 1 if bearing >= 0.0 else -1
         heard += 1
     p_left = fuse(p_self, weighted, weights)
     decision["p_self"], decision["p_left"] = p_self, p_left
