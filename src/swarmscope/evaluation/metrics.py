@@ -44,6 +44,28 @@ METRICS: list[Metric] = [
     Metric("bytes_per_robot_s", "B/s", "lower", "bytes sent per robot and second under way"),
 ]
 
+COUNTED: list[Metric] = [
+    Metric("path_stretch_any_angle", "", "lower", "sum(l) / sum of the true shortest ways, robots that arrived"),
+    Metric("planning_failures", "", "lower", "robots that did not arrive in time (N_a)"),
+    Metric("collisions", "", "lower", "robots that touched something"),
+    Metric("min_clearance_m", "m", "higher", "smallest distance of any robot to anything"),
+    Metric("fusions", "", "neither", "choices of a side, all robots (N_u)"),
+    Metric("messages", "", "lower", "packets sent, all robots"),
+    Metric("bytes_sent", "B", "lower", "payload sent, all robots"),
+    Metric("bytes_on_air", "B", "lower", "payload and the link's own overhead, all robots"),
+    Metric("bandwidth_kbps", "kbps", "lower", "payload sent by all robots per second of the run"),
+    Metric("mean_package_bytes", "B", "lower", "mean size of a packet of features"),
+    Metric("planner_memory_bytes", "B", "lower", "planner memory of one robot"),
+    Metric("plan_us_p50", "us", "lower", "time of one planning step, median (measured)"),
+    Metric("plan_us_p99", "us", "lower", "time of one planning step, 99th percentile (measured)"),
+]
+"""What a run counts by itself; found in ``metrics.json`` beside `METRICS`."""
+
+
+def metric_named(name: str) -> Metric:
+    """Return how the figure ``name`` is to be read; raises KeyError."""
+    return {metric.name: metric for metric in (*METRICS, *COUNTED)}[name]
+
 
 def path_lengths(x_m: Floats, y_m: Floats, t_s: Floats, arrival_s: Floats) -> Floats:
     """Return the length (N,) [m] each robot travelled until it arrived, or until the end of the run.

@@ -108,6 +108,7 @@ def figures(outcome: Outcome) -> dict[str, Any]:
     values |= {
         "path_stretch_any_angle": stretch,
         "reference_robots": int(np.isfinite(outcome.shortest_m).sum()),
+        "planning_failures": int((~np.isfinite(robots["arrival_s"])).sum()),
         "collisions": int(robots["crashed"].sum()),
         "min_clearance_m": float(robots["min_clearance"].min()),
         "fusions": int(robots["fusions"].sum()),

@@ -16,12 +16,13 @@ import numpy as np
 
 from swarmscope._jit import jit, jit_inner
 from swarmscope.onboard.percept import Rig
+from swarmscope.sim.advice import Advice, tell_sides
 from swarmscope.sim.cells import index_robots
 from swarmscope.sim.lidar import Beams
 from swarmscope.sim.motion import judge, move
 from swarmscope.sim.radio import exchange
 from swarmscope.sim.sensing import sense
-from swarmscope.sim.state import Clock, Noise, Radio, Records, Sim, new_records, new_sim
+from swarmscope.sim.state import CHOICES, Clock, Noise, Radio, Records, Sim, new_records, new_sim
 from swarmscope.sim.world import World
 
 CHUNK = 256
@@ -50,6 +51,8 @@ class Setting:
     limit_s: float = 300.0
     threads: int = 1
     record_scans: bool = False
+    advice: Advice | None = None
+    """Costs to go, for planners that are told the side of the shortest way, and for judging those that are not."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +64,8 @@ class Trace:
     robots: np.ndarray
     shared: np.ndarray
     links: np.ndarray
+    choices: np.ndarray
+    """Every choice of a side, a row of ``CHOICE`` each."""
     plan_us: np.ndarray
     """Time of single planning steps [us], sampled over the run; measured, so not part of the deterministic bytes."""
     wall_s: float
@@ -73,6 +78,7 @@ class Trace:
 def record_tick(sim: Sim, safe: np.ndarray, records: Records, row: int, with_scans: bool) -> None:
     """Write this tick into row ``row`` of the records."""
     beams = sim.ranges.shape[1]
+    _log_choices(sim)
     for i in range(sim.robots.size):
         robot, decision = sim.robots[i], sim.decisions[i]
         records.x[row, i], records.y[row, i], records.yaw[row, i] = robot["x"], robot["y"], robot["yaw"]
@@ -91,6 +97,28 @@ def record_tick(sim: Sim, safe: np.ndarray, records: Records, row: int, with_sca
                 records.scan[row, i, n] = level
                 if safe[i, n]:
                     records.safe[row, i, n >> 3] |= np.uint8(128 >> (n & 7))
+
+
+@jit_inner
+def _log_choices(sim: Sim) -> None:
+    """Keep the choices of a side made in this tick."""
+    for i in range(sim.robots.size):
+        robot, percept, decision = sim.robots[i], sim.percepts[i], sim.decisions[i]
+        at = sim.choices_n[0]
+        if not decision["fused"] or robot["crashed"] or at >= CHOICES:
+            continue
+        choice = sim.choices[at]
+        sim.choices_n[0] = at + 1
+        choice["tick"], choice["robot"] = int(percept["now_s"] / sim.clock.dt + 0.5), i
+        choice["x"], choice["y"] = robot["x"], robot["y"]
+        choice["target"] = math.atan2(robot["goal_y"] - robot["y"], robot["goal_x"] - robot["x"])
+        choice["p_self"], choice["p_left"] = decision["p_self"], decision["p_left"]
+        choice["side"] = decision["side"]
+        choice["told_side"] = percept["told_side"]
+        choice["heard"] = decision["heard"]
+        for k in range(decision["heard"]):
+            choice["heard_id"][k], choice["heard_side"][k] = decision["heard_id"][k], decision["heard_side"][k]
+            choice["heard_p"][k], choice["heard_f"][k] = decision["heard_p"][k], decision["heard_f"][k]
 
 
 @jit
@@ -159,6 +187,8 @@ def run(setting: Setting, progress: Callable[[float, int], None] | None = None) 
         row = tick % CHUNK
         if row == 0:
             chunks.append(new_records(min(CHUNK, ticks - tick), n, beams))
+        if setting.advice is not None:
+            tell_sides(sim, setting.advice)
         if tick % sample_every == 0:
             plan_us += _time_steps(step_all, arguments, n)
         else:
@@ -185,6 +215,7 @@ def run(setting: Setting, progress: Callable[[float, int], None] | None = None) 
         robots=sim.robots,
         shared=shared,
         links=sim.links[: sim.links_n[0]].copy(),
+        choices=sim.choices[: sim.choices_n[0]].copy(),
         plan_us=np.array(plan_us),
         wall_s=wall_s,
         memory_bytes=_row_bytes(sim, shared, memory, scratch),

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmscope.onboard.percept import DECISION, PERCEPT, Rig, Scratch, new_scratch, new_shared
+from swarmscope.onboard.percept import DECISION, PEERS, PERCEPT, Rig, Scratch, new_scratch, new_shared
 from swarmscope.onboard.sharing.message import MAX_PACKET_BYTES
 from swarmscope.sim.lidar import Beams
 from swarmscope.sim.world import World
@@ -45,6 +45,27 @@ ROBOT = np.dtype(
         ("queued", np.int64),
     ]
 )
+
+
+CHOICE = np.dtype(
+    [
+        ("tick", np.int64),
+        ("robot", np.int64),
+        ("x", np.float64),  # where it was [m], world frame
+        ("y", np.float64),
+        ("target", np.float64),  # direction of its goal [rad], world frame
+        ("p_self", np.float64),  # P_a (9)
+        ("p_left", np.float64),  # P_dir (15)
+        ("side", np.int8),  # +1 left, -1 right
+        ("told_side", np.int8),  # of the shortest way, 0 when nobody looked
+        ("heard", np.int64),  # neighbours that took part, and of each:
+        ("heard_id", np.int64, PEERS),
+        ("heard_side", np.int8, PEERS),  # +1 on the left of the target direction
+        ("heard_p", np.float64, PEERS),  # P_ni (14)
+        ("heard_f", np.float64, PEERS),  # f_ai (12)
+    ]
+)
+"""One choice of a side."""
 
 
 class Noise(NamedTuple):
@@ -116,6 +137,8 @@ class Sim(NamedTuple):
     cell_layout: np.ndarray
     links: np.ndarray
     links_n: np.ndarray
+    choices: np.ndarray
+    choices_n: np.ndarray
     radius: float
     v_max: float
     a_max: float
@@ -130,6 +153,8 @@ CELL_M = 2.5
 """Side of the cells in which robots look for neighbours [m]."""
 LINKS = 65536
 """Feature deliveries kept for the replay page."""
+CHOICES = 16384
+"""Choices of a side that are kept; later ones are counted only."""
 
 
 def new_sim(
@@ -179,6 +204,8 @@ def new_sim(
         cell_layout=np.array([bounds[0], bounds[1], float(columns), float(rows)]),
         links=np.zeros((LINKS, 4), np.int32),
         links_n=np.zeros(1, np.int64),
+        choices=np.zeros(CHOICES, CHOICE),
+        choices_n=np.zeros(1, np.int64),
         radius=float(rig.body.radius),
         v_max=float(rig.body.v_max),
         a_max=float(rig.body.a_max),

@@ -1,0 +1,128 @@
+"""Results of an experiment as they come from the store, and the figures that tables are made of."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swarmscope.evaluation.metrics import COUNTED, METRICS
+from swarmscope.evaluation.statistics import (
+    Interval,
+    PairedDifference,
+    bootstrap_mean,
+    paired_difference,
+    wilson,
+)
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Run:
+    """One finished run."""
+
+    place: str
+    planner: str
+    """Label of the planner in the experiment."""
+    seed: int
+    key: str
+    config: dict[str, Any]
+    """The complete scenario: ``parse_scenario(config)`` and ``play`` give the run again, to the bit."""
+    figures: dict[str, float | None]
+    """Every figure of ``metrics.json`` that is a number."""
+    travelled_m: Floats
+    """(N,) per robot."""
+    shortest_m: Floats
+    """(N,) A* reference, NaN without."""
+    arrival_s: Floats
+    """(N,) NaN when it did not arrive."""
+    failures: list[dict[str, Any]]
+    """Robots that did not arrive: {"robot": i, "why": words}."""
+    cases: list[dict[str, Any]]
+    """The choices of a side that neighbours turned round (see ``cases.py``)."""
+
+
+class Cell(NamedTuple):
+    """One planner in one place, over all its runs."""
+
+    place: str
+    planner: str
+    runs: int
+    robots: int
+    arrived: int
+    failures: int
+    """Robots that did not arrive (N_a)."""
+    collisions: int
+    arrival: Interval
+    """Share of robots that arrived, Wilson."""
+    pooled: dict[str, float]
+    """Figures over all robots of all runs together: path_redundancy, path_stretch, spl."""
+    per_map: dict[str, Interval]
+    """Every metric: mean over the maps where it exists, bootstrap interval."""
+
+
+def cell_of(runs: list[Run]) -> Cell:
+    """Return the figures of the runs of one planner in one place."""
+    robots = sum(len(run.arrival_s) for run in runs)
+    arrived = sum(int(np.isfinite(run.arrival_s).sum()) for run in runs)
+    known = (metric.name for metric in (*METRICS, *COUNTED))
+    names = [name for name in known if any(run.figures.get(name) is not None for run in runs)]
+    return Cell(
+        place=runs[0].place,
+        planner=runs[0].planner,
+        runs=len(runs),
+        robots=robots,
+        arrived=arrived,
+        failures=robots - arrived,
+        collisions=int(sum(run.figures.get("collisions") or 0 for run in runs)),
+        arrival=wilson(arrived, robots),
+        pooled=pooled_figures(runs),
+        per_map={name: bootstrap_mean(values_of(runs, name)) for name in names},
+    )
+
+
+def pooled_figures(runs: Iterable[Run]) -> dict[str, float]:
+    """Return path redundancy (24), stretch and SPL with sums over the robots of all runs."""
+    from swarmscope.evaluation import metrics
+
+    every = list(runs)
+    travelled = np.concatenate([run.travelled_m for run in every])
+    shortest = np.concatenate([run.shortest_m for run in every])
+    arrival = np.concatenate([run.arrival_s for run in every])
+    return {
+        "path_redundancy": metrics.path_redundancy(travelled, shortest, arrival),
+        "path_redundancy_all": metrics.path_redundancy_all(travelled, shortest, arrival),
+        "path_stretch": metrics.path_stretch(travelled, shortest, arrival),
+        "spl": metrics.spl(travelled, shortest, arrival),
+    }
+
+
+def values_of(runs: Iterable[Run], metric: str) -> Floats:
+    """Return one figure of every run, NaN where it has none."""
+    values = (run.figures.get(metric) for run in runs)
+    return np.array([np.nan if value is None else value for value in values], np.float64)
+
+
+def cells_of(runs: Iterable[Run]) -> dict[tuple[str, str], Cell]:
+    """Return the cell of every (place, planner)."""
+    return {key: cell_of(group) for key, group in grouped(runs).items()}
+
+
+def grouped(runs: Iterable[Run]) -> dict[tuple[str, str], list[Run]]:
+    """Return the runs of each (place, planner), ascending seeds."""
+    groups: dict[tuple[str, str], list[Run]] = {}
+    for run in sorted(runs, key=lambda r: r.seed):
+        groups.setdefault((run.place, run.planner), []).append(run)
+    return groups
+
+
+def paired(ours: list[Run], others: list[Run], metric: str) -> PairedDifference:
+    """Return the mean difference ours - other of one figure over the maps (seeds) that both have it on."""
+    mine = {run.seed: run.figures.get(metric) for run in ours}
+    theirs = {run.seed: run.figures.get(metric) for run in others}
+    seeds = [s for s in sorted(mine.keys() & theirs.keys()) if mine[s] is not None and theirs[s] is not None]
+    return paired_difference([mine[s] for s in seeds], [theirs[s] for s in seeds])  # type: ignore[arg-type]
