@@ -62,7 +62,7 @@ def one(job: tuple[str, int, tuple[str, ...], bool]) -> dict[str, Any]:
     metrics = figures(outcome)
     robots = outcome.trace.robots
     arrived = np.isfinite(robots["arrival_s"])
-    compared = arrived & np.isfinite(outcome.shortest_m)
+    compared = arrived & np.isfinite(outcome.references.shortest_m)
     row = {key: metrics.get(key) for key in KEPT}
     return row | {
         "task": task,
@@ -70,7 +70,7 @@ def one(job: tuple[str, int, tuple[str, ...], bool]) -> dict[str, Any]:
         "robots": len(robots),
         "arrived": int(arrived.sum()),
         "travelled_m": float(robots["length"][compared].sum()),
-        "shortest_m": float(outcome.shortest_m[compared].sum()),
+        "shortest_m": float(outcome.references.shortest_m[compared].sum()),
     }
 
 

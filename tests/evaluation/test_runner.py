@@ -156,7 +156,7 @@ def test_without_recorded_scans_their_arrays_are_empty(tmp_path):
 def test_large_swarms_get_references_for_some_robots_only(monkeypatch):
     monkeypatch.setattr(runner, "SEARCHED_M2", 2000.0)
     outcome = runner.play(scenario_of(robots=15, limit_s=1.0))
-    known = np.flatnonzero(np.isfinite(outcome.shortest_m))
+    known = np.flatnonzero(np.isfinite(outcome.references.shortest_m))
     assert known[0] == 0 and known[-1] == 14 and 2 <= len(known) < 15
     assert runner.figures(outcome)["reference_robots"] == len(known)
 
@@ -169,7 +169,7 @@ def test_any_angle_references_are_left_out_when_not_wanted_or_too_many(monkeypat
 
 def test_any_angle_is_never_longer_than_the_grid():
     outcome = runner.play(scenario_of(limit_s=0.2, robots=15))
-    assert np.all(outcome.any_angle_m <= outcome.shortest_m + 1e-9)
+    assert np.all(outcome.references.any_angle_m <= outcome.references.shortest_m + 1e-9)
 
 
 def test_a_refused_folder_is_noticed_before_the_run(tmp_path, monkeypatch):

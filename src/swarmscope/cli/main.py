@@ -21,6 +21,18 @@ app = typer.Typer(
 )
 
 
+experiments = typer.Typer(no_args_is_help=True, help="Sweeps over worlds, planners and seeds: run, resume, report.")
+app.add_typer(experiments, name="experiment")
+
+ExperimentFile = Annotated[str, typer.Argument(metavar="FILE", help="Experiment file (YAML), or a shipped one's name.")]
+Maps = Annotated[int | None, typer.Option(min=1, help="Only the first so many seeds (the papers have 20).")]
+EngineName = Annotated[str, typer.Option(help="in-process, local (processes) or ray (machines).")]
+Workers = Annotated[int | None, typer.Option(min=1, help="Processes, else one for each core.")]
+Address = Annotated[str | None, typer.Option(help="Of a Ray cluster; 'auto' for the one this machine belongs to.")]
+StorePath = Annotated[Path | None, typer.Option(help="File with the results, else runs/<name>/results.sqlite.")]
+ReportOut = Annotated[Path | None, typer.Option(help="Folder of the report, else runs/<name>/report.")]
+
+
 def _version(value: bool) -> None:
     if value:
         typer.echo(f"swarmscope {__version__}")
@@ -114,6 +126,94 @@ def tasks() -> None:
     from swarmscope.cli.lists import list_tasks
 
     list_tasks()
+
+
+@app.command(
+    epilog="Examples:\n\n"
+    "[bold]swarmscope reproduce nav-scope --maps 20[/bold]\n\n"
+    "[bold]swarmscope reproduce sfm-mas[/bold]\n\n"
+    "[bold]swarmscope reproduce nav-scope --engine ray --address auto[/bold]"
+)
+def reproduce(
+    name: Annotated[str, typer.Argument(help="nav-scope, sfm-mas, depository or traps.")],
+    maps: Maps = None,
+    engine: EngineName = "local",
+    workers: Workers = None,
+    address: Address = None,
+    store: StorePath = None,
+    out: ReportOut = None,
+) -> None:
+    """Run a published experiment, as far as it is not done yet, and write its report."""
+    from swarmscope.cli.experiment import reproduce_command
+
+    reproduce_command(name, maps, engine, workers, address, store, out)
+
+
+@experiments.command(
+    "run",
+    epilog="Examples:\n\n"
+    "[bold]swarmscope experiment run examples/doors.yaml --maps 20[/bold]\n\n"
+    "[bold]swarmscope experiment run doors.yaml --engine ray --address 10.0.0.1:6379[/bold]",
+)
+def experiment_run(
+    file: ExperimentFile,
+    maps: Maps = None,
+    engine: EngineName = "local",
+    workers: Workers = None,
+    address: Address = None,
+    store: StorePath = None,
+    out: ReportOut = None,
+) -> None:
+    """Run what is not in the store yet, then write the report. May be stopped at any moment."""
+    from swarmscope.cli.experiment import run_command
+
+    run_command(file, maps, engine, workers, address, store, out, resume=False)
+
+
+@experiments.command("resume", epilog="Example: [bold]swarmscope experiment resume doors.yaml[/bold]")
+def experiment_resume(
+    file: ExperimentFile,
+    maps: Maps = None,
+    engine: EngineName = "local",
+    workers: Workers = None,
+    address: Address = None,
+    store: StorePath = None,
+    out: ReportOut = None,
+) -> None:
+    """Go on with a run that was stopped, and try again what failed."""
+    from swarmscope.cli.experiment import run_command
+
+    run_command(file, maps, engine, workers, address, store, out, resume=True)
+
+
+@experiments.command("status", epilog="Example: [bold]swarmscope experiment status nav-scope[/bold]")
+def experiment_status(file: ExperimentFile, maps: Maps = None, store: StorePath = None) -> None:
+    """Show how many runs are done, failed and missing."""
+    from swarmscope.cli.experiment import status_command
+
+    status_command(file, maps, store)
+
+
+@experiments.command("report", epilog="Example: [bold]swarmscope experiment report nav-scope --out report[/bold]")
+def experiment_report(
+    file: ExperimentFile, maps: Maps = None, store: StorePath = None, out: ReportOut = None
+) -> None:
+    """Write the report of the runs that are done."""
+    from swarmscope.cli.experiment import report_command
+
+    report_command(file, maps, store, out)
+
+
+@experiments.command("export", epilog="Example: [bold]swarmscope experiment export nav-scope results.csv[/bold]")
+def experiment_export(
+    file: ExperimentFile,
+    csv: Annotated[Path, typer.Argument(help="CSV file to write.")],
+    store: StorePath = None,
+) -> None:
+    """Write the results as CSV, one row per run, one column per figure."""
+    from swarmscope.cli.experiment import export_command
+
+    export_command(file, csv, store)
 
 
 def main() -> None:

@@ -19,6 +19,7 @@ from swarmscope.errors import ConfigError
 from swarmscope.evaluation.run_folder import check_out
 from swarmscope.evaluation.runner import place_name, run_scenario
 from swarmscope.evaluation.scenario import Scenario, parse_scenario, read_scenario_file
+from swarmscope.evaluation.warm_up import kernels_are_cold
 
 PLACES = ("task", "map", "place")
 MOST_FAILURES = 10
@@ -57,7 +58,7 @@ def run_command(
     scenario = read_options(file, task, map_, planner, options, changes)
     place = out or Path("runs") / f"{place_name(scenario)}-{scenario.planner.name}-{scenario.seed}"
     check_out(place)
-    if kernels_are_cold():
+    if kernels_are_cold(scenario.planner.name):
         print("compiling the kernels for the first time (about 40 s, kept on disk) ...", file=sys.stderr)
     with progress_bar(scenario) as progress:
         metrics = run_scenario(scenario, place, threads, progress, add_pictures if pictures else None)
@@ -182,14 +183,3 @@ def _value(text: str, change: str) -> Any:
         with suppress(ValueError):
             return float(value)
     return value
-
-
-def kernels_are_cold() -> bool:
-    """Tell whether the compiled kernels of the simulator are not on disk yet, or older than their source."""
-    from swarmscope.sim import loop
-
-    folder = getattr(getattr(loop.world_phase, "_cache", None), "cache_path", None)
-    if folder is None:
-        return False
-    written = [index.stat().st_mtime for index in Path(folder).glob("loop.world_phase-*.nbi")]
-    return max(written, default=0.0) < Path(loop.__file__).stat().st_mtime

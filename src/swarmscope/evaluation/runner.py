@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import json
+import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from swarmscope.evaluation.provenance import git_revision, versions
 from swarmscope.evaluation.run_folder import check_out, write_run
 from swarmscope.evaluation.scenario import Scenario, complete, make_setting, make_setup
 from swarmscope.evaluation.shortest_path import any_angle_paths, grid_paths, lengths_m
+from swarmscope.evaluation.sides import make_advice
 from swarmscope.onboard.planning._contract import REASON_NAMES, STATE_NAMES
 from swarmscope.sim.loop import Setting, Trace, run
 from swarmscope.tasks import Setup
@@ -27,6 +29,17 @@ SEARCHED_M2 = 1e6
 """Sum of (start to goal)^2 over the robots that get an A* reference: some 5 s of search."""
 
 
+class References(NamedTuple):
+    """The shortest ways of a world's robots, which do not depend on who plans."""
+
+    shortest_m: np.ndarray
+    """(N,) A* lengths, NaN without."""
+    any_angle_m: np.ndarray
+    """(N,) true shortest lengths, NaN without."""
+    wall_s: float
+    """How long they took to find (measured)."""
+
+
 @dataclass(frozen=True)
 class Outcome:
     """A finished run with its references."""
@@ -35,8 +48,7 @@ class Outcome:
     setup: Setup
     setting: Setting
     trace: Trace
-    shortest_m: np.ndarray
-    any_angle_m: np.ndarray
+    references: References
 
 
 def play(
@@ -44,28 +56,44 @@ def play(
     threads: int = 1,
     progress: Callable[[float, int], None] | None = None,
     any_angle: bool = True,
+    references: References | None = None,
+    judge_sides: bool = False,
 ) -> Outcome:
-    """Run the scenario and find the reference paths; ``progress(simulated seconds, robots done)``."""
+    """Run the scenario and find the reference ways; ``progress(simulated seconds, robots done)``.
+
+    ``references`` of the same world are taken as they are. Planners that declare ``TOLD_SIDE`` are told the side of
+    the shortest way; ``judge_sides`` notes it beside every choice of the others, who never see it.
+    """
     setup = make_setup(scenario)
     setting = make_setting(scenario, setup, threads)
+    if judge_sides or getattr(setting.planner, "TOLD_SIDE", False):
+        setting = replace(setting, advice=make_advice(setup, scenario.robot.radius_m))
     trace = run(setting, progress)
+    if references is None:
+        references = find_references(scenario, setup, any_angle)
+    return Outcome(scenario, setup, setting, trace, references)
+
+
+def find_references(scenario: Scenario, setup: Setup, any_angle: bool = True) -> References:
+    """Find the shortest ways of the scenario's robots."""
     radius = scenario.robot.radius_m
-    shortest = grid_lengths(setup, radius)
-    best = np.full(len(shortest), np.nan)
-    if any_angle and scenario.robots <= ANY_ANGLE_ROBOTS:
-        best = lengths_m(any_angle_paths(setup.world, setup.starts, setup.goals, radius))
-    return Outcome(scenario, setup, setting, trace, shortest, best)
+    begun = time.perf_counter()
+    chosen = _with_reference(setup)
+    ways = grid_paths(setup.world, setup.starts[chosen], setup.goals[chosen], radius)
+    wall_s = time.perf_counter() - begun
+    shortest, best = np.full((2, scenario.robots), np.nan)
+    shortest[chosen] = lengths_m(ways)
+    if any_angle and len(chosen) == scenario.robots <= ANY_ANGLE_ROBOTS:
+        best = lengths_m(any_angle_paths(setup.world, setup.starts, setup.goals, radius, ways))
+    return References(shortest, best, wall_s)
 
 
-def grid_lengths(setup: Setup, radius: float) -> np.ndarray:
-    """Return the A* lengths (N,) [m]; of a large swarm only evenly chosen robots have one, the others NaN."""
+def _with_reference(setup: Setup) -> np.ndarray:
+    """Return the robots that get a reference way: all, or of a large swarm evenly chosen ones."""
     robots = len(setup.starts)
     apart = setup.goals - setup.starts[:, :2]
     share = min(1.0, SEARCHED_M2 / max(1.0, float((apart * apart).sum())))
-    chosen = np.unique(np.linspace(0, robots - 1, max(1, int(share * robots))).astype(int))
-    lengths = np.full(robots, np.nan)
-    lengths[chosen] = lengths_m(grid_paths(setup.world, setup.starts[chosen], setup.goals[chosen], radius))
-    return lengths
+    return np.unique(np.linspace(0, robots - 1, max(1, int(share * robots))).astype(int))
 
 
 def run_scenario(
@@ -97,17 +125,17 @@ def figures(outcome: Outcome) -> dict[str, Any]:
             _pad(records.bytes_sent),
             robots["arrival_s"],
             robots["crashed"],
-            outcome.shortest_m,
+            outcome.references.shortest_m,
         )
     )
     stretch = path_stretch(
-        path_lengths(x, y, t_s, robots["arrival_s"]), outcome.any_angle_m, robots["arrival_s"]
+        path_lengths(x, y, t_s, robots["arrival_s"]), outcome.references.any_angle_m, robots["arrival_s"]
     )
     simulated = len(trace.t_s) * outcome.setting.dt
     features = int(robots["sent_features"].sum())
     values |= {
         "path_stretch_any_angle": stretch,
-        "reference_robots": int(np.isfinite(outcome.shortest_m).sum()),
+        "reference_robots": int(np.isfinite(outcome.references.shortest_m).sum()),
         "planning_failures": int((~np.isfinite(robots["arrival_s"])).sum()),
         "collisions": int(robots["crashed"].sum()),
         "min_clearance_m": float(robots["min_clearance"].min()),
@@ -139,6 +167,7 @@ def figures(outcome: Outcome) -> dict[str, Any]:
         "plan_us_p99": _percentile(trace.plan_us, 99),
         "measured": {
             "run_wall_s": trace.wall_s,
+            "reference_s": outcome.references.wall_s,
             "real_time_factor": max(0.0, simulated - outcome.setting.dt) / trace.wall_s,
         },
     }

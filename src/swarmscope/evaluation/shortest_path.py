@@ -76,12 +76,18 @@ def grid_paths(
     return [search.path(start, goal) for start, goal in pairs]
 
 
-def any_angle_paths(spec: WorldSpec, starts: Floats, goals: Floats, radius: float) -> list[ShortestPath]:
-    """Return shortest ways of any direction for discs of ``radius`` [m]: exact in worlds of circles."""
+def any_angle_paths(
+    spec: WorldSpec, starts: Floats, goals: Floats, radius: float, grid: list[ShortestPath] | None = None
+) -> list[ShortestPath]:
+    """Return shortest ways of any direction for discs of ``radius`` [m]: exact in worlds of circles.
+
+    ``grid`` are the same robots' `grid_paths`, if they are known already.
+    """
+    grid = grid if grid is not None else grid_paths(spec, starts, goals, radius)
     world = compile_world(spec)
     only_circles = len(world.segments) == 0 and world.solid.size == 0
     ways = []
-    for way, start, goal in zip(grid_paths(spec, starts, goals, radius), starts[:, :2], goals, strict=True):
+    for way, start, goal in zip(grid, starts[:, :2], goals, strict=True):
         taut = pulled_path(world, way, radius)
         exact = taut_path(world.circles, start, goal, radius, taut.length_m) if only_circles else None
         ways.append(exact or taut)

@@ -10,8 +10,15 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from swarmscope.evaluation.statistics import Interval
+from swarmscope.errors import ConfigError
+from swarmscope.evaluation.experiment import Experiment, merged
+from swarmscope.evaluation.runner import play
+from swarmscope.evaluation.scenario import parse_scenario
+from swarmscope.evaluation.seeds import seed_set
+from swarmscope.evaluation.statistics import RESAMPLES, Interval, wilson
+from swarmscope.onboard.planning.fields import interaction_force
 
 SELF_PRINTED, NEIGHBOUR_PRINTED, WEIGHT_PRINTED = 0.245, 0.446, 0.195
 
@@ -50,3 +57,37 @@ def count_errors(choices: np.ndarray) -> tuple[int, int, int, int]:
     present = np.arange(known["heard_p"].shape[1])[None, :] < known["heard"][:, None]
     says_left = known["heard_p"] >= 0.5
     return own_wrong, len(known), int(np.sum(present & (says_left != left[:, None]))), int(present.sum())
+
+
+def estimate_weight(experiment: Experiment) -> WeightResult:
+    """Run the swarm samples of ``experiment.weight`` and return the error rates and the weight."""
+    asked = experiment.weight
+    if asked is None:
+        raise ConfigError("weight", "the experiment does not say where to estimate it")
+    keys = merged(merged(experiment.scenario, experiment.places[asked.place]), experiment.planners[asked.planner])
+    seeds = seed_set(asked.seeds)
+    counts = []
+    for seed in seeds:
+        scenario = parse_scenario(keys | {"seed": seed, "record_scans": "no"}, "weight")
+        outcome = play(scenario, any_angle=False, judge_sides=True)
+        counts.append(count_errors(outcome.trace.choices))
+    protection = outcome.setting.rig.protection
+    return weight_of(np.array(counts), protection.sigma_a, seeds)
+
+
+def weight_of(counts: NDArray[np.int64], sigma_a: float, seeds: list[int]) -> WeightResult:
+    """Return rates and weight of ``counts`` (S, 4), a row of `count_errors` for each sample of the swarm.
+
+    The interval of the weight is a bootstrap over the samples, because the choices within one are not independent.
+    """
+    own_wrong, choices, neighbours_wrong, opinions = (int(v) for v in counts.sum(axis=0))
+    own, neighbours = wilson(own_wrong, choices), wilson(neighbours_wrong, opinions)
+    rng = np.random.default_rng(0)
+    picks = counts[rng.integers(0, len(counts), size=(RESAMPLES, len(counts)))].sum(axis=1)
+    weights = [adaboost_weight(a / max(1, b), c / max(1, d)) for a, b, c, d in picks]
+    finite = np.array(weights)[np.isfinite(weights)]
+    low, high = np.quantile(finite, [0.025, 0.975]) if len(finite) else (math.nan, math.nan)
+    distances = np.linspace(1.0, 3.0, 2001) * sigma_a
+    peak = max(interaction_force(float(d), sigma_a, 1.0) for d in distances)
+    weight = adaboost_weight(own.estimate, neighbours.estimate)
+    return WeightResult(own, neighbours, weight, float(low), float(high), peak, seeds)

@@ -1,0 +1,177 @@
+"""``swarmscope experiment`` and ``swarmscope reproduce``."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.table import Table
+
+from swarmscope.cli._console import PlainConsole
+from swarmscope.cli._errors import FAILED, INTERRUPTED
+from swarmscope.evaluation.campaign import Keyed, State, run_missing, state_of
+from swarmscope.evaluation.campaign import Progress as Report
+from swarmscope.evaluation.engines import make_engine
+from swarmscope.evaluation.experiment import (
+    Experiment,
+    load_experiment,
+    shipped_experiment,
+    shipped_experiments,
+)
+from swarmscope.evaluation.store import Store
+from swarmscope.evaluation.weight import estimate_weight
+
+MOST_ERRORS = 5
+
+
+def reproduce_command(
+    name: str,
+    maps: int | None,
+    engine: str,
+    workers: int | None,
+    address: str | None,
+    store: Path | None,
+    out: Path | None,
+) -> None:
+    """Run a shipped experiment."""
+    shipped_experiment(name)  # names the valid ones
+    run_command(name, maps, engine, workers, address, store, out, resume=False)
+
+
+def run_command(
+    file: str,
+    maps: int | None,
+    engine: str,
+    workers: int | None,
+    address: str | None,
+    store: Path | None,
+    out: Path | None,
+    resume: bool,
+) -> None:
+    """Run what is missing and write the report."""
+    experiment = load(file)
+    machine = make_engine(engine, workers, address)
+    place = store_path(experiment, store)
+    with Store(place, create=not resume) as results:
+        try:
+            with progress_bar(experiment.name) as progress:
+                state = run_missing(experiment, results, machine, maps, resume, progress, _say)
+        except KeyboardInterrupt:
+            typer.echo(f"swarmscope: stopped; finished runs are kept in {place}; the same command goes on", err=True)
+            raise typer.Exit(INTERRUPTED) from None
+        _print_errors(state)
+        write(experiment, results, state, place, out)
+    if state.failed:
+        raise typer.Exit(FAILED)
+
+
+def status_command(file: str, maps: int | None, store: Path | None) -> None:
+    """Print what is done, failed and missing."""
+    experiment = load(file)
+    place = store_path(experiment, store)
+    with Store(place, create=False) as results:
+        state = state_of(experiment, results, maps)
+        table = Table("place", "planner", "done", "failed", "missing")
+        for (where, planner), units in _cells(state.units).items():
+            done = sum(key in state.done for _, key in units)
+            failed = sum(key in state.failed for _, key in units)
+            table.add_row(where, planner, str(done), str(failed), str(len(units) - done - failed))
+        PlainConsole().print(table)
+        missing = len({key for _, key in state.missing})
+        health = results.check()
+        print(f"{place}: {len(state.done)} done, {len(state.failed)} failed, {missing} missing; file {health}")
+        _print_errors(state)
+
+
+def report_command(file: str, maps: int | None, store: Path | None, out: Path | None) -> None:
+    """Write the report of what is done."""
+    experiment = load(file)
+    place = store_path(experiment, store)
+    with Store(place, create=False) as results:
+        write(experiment, results, state_of(experiment, results, maps), place, out)
+
+
+def export_command(file: str, csv: Path, store: Path | None) -> None:
+    """Write the results as CSV."""
+    experiment = load(file)
+    with Store(store_path(experiment, store), create=False) as results:
+        print(f"{csv}: {results.export(experiment.name, csv)} runs")
+
+
+def load(file: str) -> Experiment:
+    """Return the experiment in a file, or the shipped one of that name."""
+    path = Path(file)
+    if not path.exists() and (file in shipped_experiments() or path.suffix not in (".yaml", ".yml")):
+        path = shipped_experiment(file)
+    return load_experiment(path)
+
+
+def store_path(experiment: Experiment, store: Path | None) -> Path:
+    """Return where the results are."""
+    return store or Path("runs") / experiment.name / "results.sqlite"
+
+
+def write(experiment: Experiment, results: Store, state: State, store: Path, out: Path | None) -> None:
+    """Write the report of the runs that are done."""
+    from swarmscope.viewing.report import write_report
+
+    runs = list(results.runs(state.units))
+    if not runs:
+        print("nothing is done yet: no report")
+        return
+    with Console(stderr=True).status("writing the report ...") as status:
+        weight = estimate_weight(experiment) if experiment.weight and "weight" in experiment.figures else None
+        folder = out or store.parent / "report"
+        page = write_report(experiment, runs, folder, weight, status.update)
+    print(page)
+
+
+@contextmanager
+def progress_bar(name: str) -> Iterator[Report]:
+    """Show how many runs are done, the time that it took and the time left, while the body runs."""
+    with Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[note]}"),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+        console=Console(stderr=True),
+        transient=True,
+    ) as bar:
+        job = bar.add_task(name, total=None, note="")
+        first: list[int] = []
+
+        def progress(done: int, failed: int, total: int) -> None:
+            if not first:  # what was done before does not count for the time left
+                first.append(done + failed - 1)
+                bar.update(job, total=total, completed=first[0])
+                bar.reset(job, total=total, completed=first[0], note="")
+            bar.update(job, completed=done + failed, total=total, note=f"{failed} failed" if failed else "")
+
+        yield progress
+
+
+def _say(words: str) -> None:
+    print(words, file=sys.stderr)
+
+
+def _print_errors(state: State) -> None:
+    for key in list(state.failed)[:MOST_ERRORS]:
+        unit = next(u for u, k in state.units if k == key)
+        print(f"failed: {unit.place}, {unit.planner}, seed {unit.seed}: {state.failed[key]}", file=sys.stderr)
+    if len(state.failed) > MOST_ERRORS:
+        print(f"... and {len(state.failed) - MOST_ERRORS} more", file=sys.stderr)
+
+
+def _cells(units: list[Keyed]) -> dict[tuple[str, str], list[Keyed]]:
+    cells: dict[tuple[str, str], list[Keyed]] = {}
+    for unit, key in units:
+        cells.setdefault((unit.place, unit.planner), []).append((unit, key))
+    return cells
