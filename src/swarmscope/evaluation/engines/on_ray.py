@@ -7,6 +7,7 @@ trust each other. The machines need the same version of swarmscope (``work`` ref
 from __future__ import annotations
 
 import os
+import socket
 from collections import deque
 from collections.abc import Iterator
 from typing import Any
@@ -18,6 +19,8 @@ from swarmscope.evaluation.work import work
 
 AHEAD = 2
 """Jobs that are handed out for each core of the cluster."""
+REACH_S = 5.0
+"""How long the head of a cluster may take to answer."""
 POLL_S = 5.0
 """How often the size of the cluster is looked at, which may grow and shrink."""
 
@@ -69,6 +72,7 @@ class OnRay:
         """Join the cluster, or start one here; quietly."""
         os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")
         options: dict[str, Any] = {"log_to_driver": False, "logging_level": "ERROR", "include_dashboard": False}
+        _check_reachable(self.address)
         if self.address is None:
             options["num_cpus"] = self.workers
         else:
@@ -82,6 +86,17 @@ class OnRay:
         except (ConnectionError, RuntimeError, ValueError, OSError) as error:
             where = self.address or "this machine"
             raise SwarmscopeError(f"no Ray cluster at {where}: {' '.join(str(error).split())[:300]}") from error
+
+
+def _check_reachable(address: str | None) -> None:
+    """Raise a SwarmscopeError at once when nobody listens at ``host:port``; Ray would wait for minutes."""
+    host, colon, port = (address or "").removeprefix("ray://").rpartition(":")
+    if not colon or not port.isdigit():
+        return  # none, or 'auto'
+    try:
+        socket.create_connection((host, int(port)), REACH_S).close()
+    except (OSError, OverflowError) as error:
+        raise SwarmscopeError(f"no Ray cluster at {address}: {error}") from None
 
 
 def _load_ray() -> Any:
