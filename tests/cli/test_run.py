@@ -255,7 +255,7 @@ def test_control_c_ends_with_130_and_one_line(tmp_path, monkeypatch):
 
 
 def test_first_use_says_that_kernels_are_compiled(tmp_path, monkeypatch):
-    monkeypatch.setattr(run_module, "kernels_are_cold", lambda: True)
+    monkeypatch.setattr(run_module, "kernels_are_cold", lambda planner: planner == "nav-scope")
     assert "compiling the kernels" in swarmscope("run", *SMALL, "--out", tmp_path / "a").stderr
     monkeypatch.undo()
     assert "compiling" not in swarmscope("run", *SMALL, "--out", tmp_path / "b").stderr

@@ -15,7 +15,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "extending.md").read_text(encoding="utf-8")
 BLOCK = re.compile(r"^(New file|In) `([^`]+)`([^:\n]*):\n\n```python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 ANCHORS = {
-    ", at the end of `METRICS`": "]\n\n\ndef path_lengths(",
+    ", at the end of `METRICS`": "]\nCOUNTED: list[Metric]",
     ", before `all_metrics`": "def all_metrics(",
     ", at the end of `values` in `all_metrics`": "    }\n    return {metric.name",
 }

@@ -49,7 +49,7 @@ def test_figures_agree_with_the_trajectory(crossing):
     out, figures = crossing
     arrays = read_trajectory(out)
     steps = np.hypot(np.diff(arrays["x_m"], axis=0), np.diff(arrays["y_m"], axis=0))
-    shortest = runner.play(scenario_of(limit_s=0.2, seed=3, robots=12)).shortest_m
+    shortest = runner.play(scenario_of(limit_s=0.2, seed=3, robots=12)).references.shortest_m
     assert figures["path_stretch"] == pytest.approx(steps.sum() / shortest.sum(), rel=5e-3)
     assert figures["path_redundancy"] == pytest.approx(1.0 - 1.0 / figures["path_stretch"])
     assert figures["duration_s"] == pytest.approx(float(np.nanmax(arrays["arrival_s"])))
@@ -162,9 +162,9 @@ def test_large_swarms_get_references_for_some_robots_only(monkeypatch):
 
 
 def test_any_angle_references_are_left_out_when_not_wanted_or_too_many(monkeypatch):
-    assert np.isnan(runner.play(scenario_of(limit_s=1.0), any_angle=False).any_angle_m).all()
+    assert np.isnan(runner.play(scenario_of(limit_s=1.0), any_angle=False).references.any_angle_m).all()
     monkeypatch.setattr(runner, "ANY_ANGLE_ROBOTS", 3)
-    assert np.isnan(runner.play(scenario_of(limit_s=1.0)).any_angle_m).all()
+    assert np.isnan(runner.play(scenario_of(limit_s=1.0)).references.any_angle_m).all()
 
 
 def test_any_angle_is_never_longer_than_the_grid():

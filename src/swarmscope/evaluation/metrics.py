@@ -43,7 +43,6 @@ METRICS: list[Metric] = [
     Metric("mean_speed_mps", "m/s", "higher", "length travelled per time under way, over all robots"),
     Metric("bytes_per_robot_s", "B/s", "lower", "bytes sent per robot and second under way"),
 ]
-
 COUNTED: list[Metric] = [
     Metric("path_stretch_any_angle", "", "lower", "sum(l) / sum of the true shortest ways, robots that arrived"),
     Metric("planning_failures", "", "lower", "robots that did not arrive in time (N_a)"),
