@@ -126,3 +126,35 @@ def paired(ours: list[Run], others: list[Run], metric: str) -> PairedDifference:
     theirs = {run.seed: run.figures.get(metric) for run in others}
     seeds = [s for s in sorted(mine.keys() & theirs.keys()) if mine[s] is not None and theirs[s] is not None]
     return paired_difference([mine[s] for s in seeds], [theirs[s] for s in seeds])  # type: ignore[arg-type]
+
+
+class TimeBudget(NamedTuple):
+    """Where the seconds of a task go: the first five add up to the mean time of the last arrival."""
+
+    shortest_s: float
+    """Shortest way (A*) at top speed, mean over robots that arrived."""
+    detour_s: float
+    """What the way is longer, at top speed."""
+    waiting_s: float
+    """Standing still."""
+    slow_s: float
+    """The rest of a robot's time: turning on the spot, accelerating, driving below top speed."""
+    last_s: float
+    """From the mean arrival to the last one."""
+    duration_s: float
+
+
+def time_budget(runs: list[Run]) -> TimeBudget:
+    """Return where the time goes, means over the maps in which somebody arrived; NaN without any."""
+    rows = []
+    for run in runs:
+        there = np.isfinite(run.arrival_s) & np.isfinite(run.shortest_m)
+        duration, waiting = run.figures.get("duration_s"), run.figures.get("waiting_s")
+        if not there.any() or duration is None or waiting is None:
+            continue
+        v_max = float(run.config["robot"]["v_max_mps"])
+        shortest, travelled = run.shortest_m[there].mean() / v_max, run.travelled_m[there].mean() / v_max
+        mean = run.arrival_s[there].mean()
+        parts = (shortest, travelled - shortest, waiting, mean - travelled - waiting, duration - mean, duration)
+        rows.append(parts)
+    return TimeBudget(*(np.mean(rows, axis=0).tolist() if rows else [np.nan] * 6))

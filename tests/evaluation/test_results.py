@@ -1,0 +1,46 @@
+import math
+
+import numpy as np
+import pytest
+
+from swarmscope.evaluation.results import Run, cell_of, cells_of, paired, pooled_figures, time_budget, values_of
+
+
+def run(planner="ours", seed=0, travelled=(10.0, 12.0), shortest=(10.0, 10.0), arrival=(22.0, 30.0), **figures):
+    known = {"duration_s": np.nanmax(arrival), "waiting_s": 1.0, "path_redundancy": 0.1, "collisions": 0.0}
+    arrays = [np.array(values, float) for values in (travelled, shortest, arrival)]
+    config = {"robot": {"v_max_mps": 0.5}}
+    return Run("T1", planner, seed, f"{planner}{seed}", config, known | figures, *arrays, failures=[], cases=[])
+
+
+def test_sums_go_over_the_robots_of_all_maps():
+    one = run(travelled=(10.0, 20.0), shortest=(10.0, 10.0))
+    two = run(seed=1, travelled=(50.0, 99.0), shortest=(40.0, 40.0), arrival=(120.0, math.nan))
+    found = pooled_figures([one, two])
+    assert found["path_stretch"] == pytest.approx(80.0 / 60.0)
+    assert found["path_redundancy"] == pytest.approx(1.0 - 0.75 * 60.0 / 80.0)
+    assert found["spl"] == pytest.approx((1.0 + 0.5 + 0.8 + 0.0) / 4.0)
+
+
+def test_cell():
+    runs = [run(), run(seed=1, arrival=(20.0, math.nan), path_redundancy=None, collisions=1.0)]
+    cell = cell_of(runs)
+    assert (cell.runs, cell.robots, cell.arrived, cell.failures, cell.collisions) == (2, 4, 3, 1, 1)
+    assert cell.per_map["path_redundancy"].used == 1 and cell.per_map["waiting_s"].estimate == 1.0
+    assert cell.arrival.estimate == 0.75
+    assert list(cells_of([*runs, run("other")])) == [("T1", "ours"), ("T1", "other")]
+    assert np.isnan(values_of(runs, "path_redundancy")).tolist() == [False, True]
+
+
+def test_pairs_are_matched_by_seed():
+    ours = [run(seed=k, path_redundancy=0.1 * k) for k in range(5)]
+    others = [run("other", seed=k, path_redundancy=0.1 * k + 0.05) for k in (4, 2, 9)]
+    found = paired(ours, others, "path_redundancy")
+    assert found.used == 2 and found.estimate == pytest.approx(-0.05)
+
+
+def test_the_time_budget_adds_up():
+    found = time_budget([run()])
+    assert found == pytest.approx((20.0, 2.0, 1.0, 3.0, 4.0, 30.0))
+    assert sum(found[:5]) == pytest.approx(found.duration_s)
+    assert math.isnan(time_budget([run(arrival=(math.nan, math.nan), duration_s=None)]).duration_s)
