@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 import threading
+from importlib import import_module
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,7 +24,7 @@ from swarmscope.geometry import angle_from, point_segment_distance, wrap_angle
 from swarmscope.onboard.control.guard import halt, head_for
 from swarmscope.onboard.control.unicycle import arrival_speed
 from swarmscope.onboard.percept import PEERS, Rig, Row, Scratch
-from swarmscope.onboard.perception.safety import beam_of, corridor_length, safe_directions
+from swarmscope.onboard.perception.safety import corridor_length, safe_directions
 from swarmscope.onboard.planning._contract import (
     ADVANCE,
     ARRIVED,
@@ -44,14 +45,14 @@ from swarmscope.onboard.tick import begin, finish
 NAME = "orca"
 SUMMARY = "ORCA by the library navground (extra 'orca'), with a rule against dead ends; a baseline"
 NEEDS = "own scan, goal bearing and distance, relative poses of visible neighbours"
-MAX_LINES = 48
+MAX_LINES = 40
 """Segments that the library is given for one robot; with more, all are made coarser."""
 LINE_ERROR = 0.015
 """Returns lie within this of their segment [m]."""
 GAIN = 0.1
 """A robot makes progress when it gets this much closer to its goal than ever [m]."""
-LEAVE_GAIN = 0.3
-"""How much closer to the goal than at its begin a strict following must end [m]."""
+LEAVE_GAIN = 0.5
+"""How much closer to the goal than ever before the free way must lead for a strict following to end [m]."""
 
 
 class Params(NamedTuple):
@@ -61,7 +62,7 @@ class Params(NamedTuple):
     """Collisions with robots are avoided this far ahead."""
     obstacle_horizon_s: float = 1.5
     """The same for obstacles."""
-    margin: float = 0.05
+    margin: float = 0.03
     """Kept free around the body, what the wheels cannot follow exactly included."""
     centre: float = 0.0
     """The effective centre lies this far ahead of the axle; 0: the axle, with a speed limited by the heading error."""
@@ -87,11 +88,11 @@ MEMORY = np.dtype(
     [
         ("arrived", np.uint8),
         ("side", np.int8),  # of the border that is followed: +1 left, -1 right, 0 none
-        ("strict", np.uint8),  # the following ends only closer to the goal than it began
+        ("strict", np.uint8),  # the following ends only where the way leads closer to the goal than ever
         ("last_side", np.int8),  # side of the last following without progress since
         ("best", np.float64),  # smallest goal distance so far [m]
         ("best_s", np.float64),  # when the last progress, following or evading ended
-        ("hit", np.float64),  # goal distance where the following began [m]
+        ("closest", np.float64),  # goal distance of the nearest point seen free on the way, where followings began [m]
         ("wind", np.float64),  # how far the following has turned off the target; may exceed 2 pi [rad]
         ("target", np.float64),  # direction of the target at the last tick, compass frame [rad]
         ("turn_s", np.float64),  # when the following changes its side
@@ -117,7 +118,7 @@ _local = threading.local()
 def new_memory(robots: int) -> np.ndarray:
     """Return the memory of ``robots`` robots that have seen nothing yet."""
     memory = np.zeros(robots, MEMORY)
-    memory["best"] = np.inf
+    memory["best"] = memory["closest"] = np.inf
     memory["evade_s"] = -1.0
     return memory
 
@@ -146,11 +147,11 @@ def _library() -> Any:
     found = getattr(_local, "library", None)
     if found is None:
         try:
-            from navground.core import LineSegment, Neighbor
-            from navground.core.behaviors import ORCABehavior
+            core = import_module("navground.core")
+            behaviors = import_module("navground.core.behaviors")
         except ImportError:
             raise MissingExtraError(f"planner '{NAME}'", "orca") from None
-        found = _local.library = (LineSegment, Neighbor, ORCABehavior())
+        found = _local.library = (core.LineSegment, core.Neighbor, behaviors.ORCABehavior())
     return found
 
 
@@ -264,13 +265,11 @@ def _prefer(
     memory["lines_n"] = 0
     sensor = rig.sensor
     final = goal <= max(rig.protection.l_th + rig.footprint, rig.look_ahead)
-    if final:
-        free = corridor_length(work, sensor.range_min, rig.cos, rig.sin, bearing, rig.footprint, goal) >= goal
-    else:
-        beam = beam_of(bearing, sensor.angle_min, sensor.increment, sensor.beams, sensor.wraps)
-        free = beam >= 0 and safe[beam] == 1
+    limit = min(goal, sensor.range_max)
+    half_width = rig.body.radius + params.margin
+    way = corridor_length(work, sensor.range_min, rig.cos, rig.sin, bearing, half_width, limit)
     if params.deadlock > 0.0:
-        _watch(percept, memory, safe, free, rig, params)
+        _watch(percept, memory, safe, way, rig, params)
     memory["turn"] = 0.0
     memory["speed"] = arrival_speed(goal - 0.5 * params.arrive_m, rig.body.v_max, rig.body.a_max, percept["dt_s"])
     decision["state"], decision["reason"] = ADVANCE, R_FINAL if final else R_FREE
@@ -283,15 +282,19 @@ def _prefer(
 
 
 @jit_inner
-def _watch(percept: Row, memory: Row, safe: np.ndarray, free: bool, rig: Rig, params: Params) -> None:
-    """Notice progress and its absence: begin and end followings and evasions. ``free``: the way to the goal is."""
+def _watch(percept: Row, memory: Row, safe: np.ndarray, way: float, rig: Rig, params: Params) -> None:
+    """Notice progress and its absence: begin and end followings and evasions.
+
+    ``way`` [m] is free towards the goal. A strict following ends where that leads closer to the goal than any before.
+    """
     goal, now = percept["goal_distance"], percept["now_s"]
+    free = way >= min(goal, rig.look_ahead)
     if goal < memory["best"] - GAIN:
         memory["best"], memory["best_s"] = goal, now
         if memory["side"] == 0:
             memory["last_side"] = 0
     if memory["side"] != 0:
-        if free and (memory["strict"] == 0 or goal < memory["hit"] - LEAVE_GAIN):
+        if free and (memory["strict"] == 0 or way >= goal or goal - way < memory["closest"] - LEAVE_GAIN):
             memory["last_side"], memory["side"], memory["strict"] = memory["side"], 0, 0
             memory["best_s"] = now
         elif now > memory["turn_s"]:
@@ -312,7 +315,7 @@ def _watch(percept: Row, memory: Row, safe: np.ndarray, free: bool, rig: Rig, pa
     side = 1 if left < right or (left == right and percept["goal_bearing"] >= 0.0) else -1
     memory["side"] = memory["last_side"] if again else side
     memory["strict"] = again
-    memory["hit"] = goal
+    memory["closest"] = min(memory["closest"], goal - way)
     memory["wind"] = 0.0
     memory["target"] = percept["compass"] + percept["goal_bearing"]
     memory["loop_s"] = params.loop_s
@@ -416,8 +419,25 @@ def _segments(
     error = LINE_ERROR
     while True:
         if _divide(percept, memory, work, keep, hits, count, (last + 1) % count, closed, error, rig, params):
-            return
+            break
         error *= 2.0
+    _sort(memory["lines"], memory["lines_n"])
+
+
+@jit_inner
+def _sort(lines: np.ndarray, count: int) -> None:
+    """Order segments by the distance of their middle: where two touch, the library's answer depends on the order."""
+    for k in range(1, count):
+        ax, ay, bx, by = lines[k, 0, 0], lines[k, 0, 1], lines[k, 1, 0], lines[k, 1, 1]
+        middle = (ax + bx) * (ax + bx) + (ay + by) * (ay + by)
+        j = k
+        while j > 0 and middle < (lines[j - 1, 0, 0] + lines[j - 1, 1, 0]) ** 2 + (
+            lines[j - 1, 0, 1] + lines[j - 1, 1, 1]
+        ) ** 2:
+            for end in range(2):
+                lines[j, end, 0], lines[j, end, 1] = lines[j - 1, end, 0], lines[j - 1, end, 1]
+            j -= 1
+        lines[j, 0, 0], lines[j, 0, 1], lines[j, 1, 0], lines[j, 1, 1] = ax, ay, bx, by
 
 
 @jit_inner
