@@ -6,7 +6,7 @@ The preferred velocity points at the goal. ORCA alone stops wherever that leads 
 as its users do, a planner above it leads a robot that makes no progress along the border (``deadlock = 0``: plain
 ORCA). Nothing is sent: the robots only see each other.
 
-All that the library is given is in the *goal frame*: origin at the effective centre, x towards the goal.
+All that the library is given is in the *goal frame*: origin at the robot, x towards the goal.
 """
 
 from __future__ import annotations
@@ -49,8 +49,6 @@ MAX_LINES = 40
 """Segments that the library is given for one robot; with more, all are made coarser."""
 LINE_ERROR = 0.015
 """Returns lie within this of their segment [m]."""
-GAIN = 0.1
-"""A robot makes progress when it gets this much closer to its goal than ever [m]."""
 LEAVE_GAIN = 0.5
 """How much closer to the goal than ever before the free way must lead for a strict following to end [m]."""
 
@@ -62,17 +60,17 @@ class Params(NamedTuple):
     """Collisions with robots are avoided this far ahead."""
     obstacle_horizon_s: float = 1.5
     """The same for obstacles."""
-    margin: float = 0.03
+    margin: float = 0.035
     """Kept free around the body, what the wheels cannot follow exactly included."""
-    centre: float = 0.0
-    """The effective centre lies this far ahead of the axle; 0: the axle, with a speed limited by the heading error."""
     creep: float = 0.2
-    """Answers slower than this share of the preferred speed are not driven."""
+    """Answers slower than this share of the preferred speed are not driven while an obstacle is in the way."""
     deadlock: float = 1.0
     """1: without progress follow the border; 0: plain ORCA."""
     stall_s: float = 2.0
     """No progress for so long is a dead end."""
-    turn_back: float = 1.75
+    progress: float = 0.3
+    """Progress is to get closer to the goal than ever at this share of the top speed, or faster."""
+    turn_back: float = 2.5
     """A following turns back towards the target by at most this in one tick [rad]."""
     evade: float = 1.0
     """Turn to the right [rad] of the preferred velocity in a jam of robots, for ``stall_s``."""
@@ -80,13 +78,14 @@ class Params(NamedTuple):
     """A following that lasts longer changes its side; the time doubles with every change."""
     arrive_m: float = 0.05
     """Distance to the goal at which a robot has arrived."""
-    still_s: float = 0.6
+    still_s: float = 1.0
     """A neighbour that has not moved for so long is an obstacle."""
 
 
 MEMORY = np.dtype(
     [
         ("arrived", np.uint8),
+        ("free", np.uint8),  # the straight way to the goal is, as far as we look ahead
         ("side", np.int8),  # of the border that is followed: +1 left, -1 right, 0 none
         ("strict", np.uint8),  # the following ends only where the way leads closer to the goal than ever
         ("last_side", np.int8),  # side of the last following without progress since
@@ -158,7 +157,7 @@ def _library() -> Any:
 def _ask_library(library: Any, memories: np.ndarray, percepts: np.ndarray, rig: Rig, params: Params) -> None:
     """Write the library's answer to every robot that has a preferred velocity into its memory."""
     segment, neighbour, orca = library
-    orca.radius = rig.body.radius + params.centre
+    orca.radius = rig.body.radius
     orca.safety_margin = params.margin
     orca.time_horizon = params.horizon_s
     orca.static_time_horizon = params.obstacle_horizon_s
@@ -216,7 +215,7 @@ def prepare_all(
                 scratch.edges[i], rig, params)  # fmt: skip
         if memories[i]["lines_n"] < 0:
             continue
-        _own_velocity(percepts[i], memories[i], params)
+        _own_velocity(percepts[i], memories[i])
         _neighbours(percepts[i], shared[i], memories[i], rig, params)
         _segments(percepts[i], memories[i], scratch.work[i], scratch.narrow[i], scratch.edges[i], rig, params)
 
@@ -256,7 +255,6 @@ def _prefer(
     """Choose the preferred velocity: towards the goal, along a border, or out of a jam."""
     goal, bearing, now = percept["goal_distance"], percept["goal_bearing"], percept["now_s"]
     memory["lines_n"] = -1
-    memory["others_n"] = 0
     if memory["arrived"] or goal <= params.arrive_m:
         memory["arrived"], memory["side"] = 1, 0
         halt(decision)
@@ -268,6 +266,7 @@ def _prefer(
     limit = min(goal, sensor.range_max)
     half_width = rig.body.radius + params.margin
     way = corridor_length(work, sensor.range_min, rig.cos, rig.sin, bearing, half_width, limit)
+    memory["free"] = way >= min(goal, rig.look_ahead)
     if params.deadlock > 0.0:
         _watch(percept, memory, safe, way, rig, params)
     memory["turn"] = 0.0
@@ -288,8 +287,8 @@ def _watch(percept: Row, memory: Row, safe: np.ndarray, way: float, rig: Rig, pa
     ``way`` [m] is free towards the goal. A strict following ends where that leads closer to the goal than any before.
     """
     goal, now = percept["goal_distance"], percept["now_s"]
-    free = way >= min(goal, rig.look_ahead)
-    if goal < memory["best"] - GAIN:
+    free = memory["free"]
+    if goal < memory["best"] - params.progress * params.stall_s * rig.body.v_max:
         memory["best"], memory["best_s"] = goal, now
         if memory["side"] == 0:
             memory["last_side"] = 0
@@ -307,8 +306,8 @@ def _watch(percept: Row, memory: Row, safe: np.ndarray, way: float, rig: Rig, pa
     if now - memory["best_s"] < params.stall_s or now < memory["evade_s"]:
         return
     if free:
-        memory["evade_s"] = now + params.stall_s
-        memory["best_s"] = now + params.stall_s
+        if memory["others_n"] > 0:  # seen at the last tick
+            memory["evade_s"] = memory["best_s"] = now + params.stall_s
         return
     again = memory["last_side"] != 0
     left, right = turn_to_safe(percept, safe, 1, rig), turn_to_safe(percept, safe, -1, rig)
@@ -365,26 +364,23 @@ def _follow(
 
 
 @jit_inner
-def _own_velocity(percept: Row, memory: Row, params: Params) -> None:
-    """Write the velocity of our effective centre: ahead at the measured speed, sideways as we turn."""
-    c, s = math.cos(percept["goal_bearing"]), math.sin(percept["goal_bearing"])
-    ahead, aside = percept["speed"], params.centre * percept["odom_yaw"] / percept["dt_s"]
-    memory["vx"], memory["vy"] = c * ahead + s * aside, c * aside - s * ahead
+def _own_velocity(percept: Row, memory: Row) -> None:
+    """Write our own velocity, ahead at the measured speed."""
+    bearing = percept["goal_bearing"]
+    memory["vx"], memory["vy"] = math.cos(bearing) * percept["speed"], -math.sin(bearing) * percept["speed"]
 
 
 @jit_inner
 def _neighbours(percept: Row, shared: Row, memory: Row, rig: Rig, params: Params) -> None:
     """Write the neighbours that move; those that stand are in the scan, as obstacles."""
-    bearing = percept["goal_bearing"]
-    turn = percept["compass"] + bearing
+    turn = percept["compass"] + percept["goal_bearing"]
     c, s = math.cos(turn), math.sin(turn)
-    ahead_x, ahead_y = params.centre * math.cos(bearing), -params.centre * math.sin(bearing)
     count = 0
     for t in range(PEERS):
         if shared["track_id"][t] < 0 or percept["now_s"] - shared["track_moved_s"][t] >= params.still_s:
             continue
         x, y = shared["track_x"][t], shared["track_y"][t]
-        memory["others"][count, 0, 0], memory["others"][count, 0, 1] = c * x + s * y - ahead_x, c * y - s * x - ahead_y
+        memory["others"][count, 0, 0], memory["others"][count, 0, 1] = c * x + s * y, c * y - s * x
         memory["radii"][count] = rig.body.radius + rig.sensor.position_sigma * math.sqrt(x * x + y * y)
         x, y = shared["track_vx"][t], shared["track_vy"][t]
         memory["others"][count, 1, 0], memory["others"][count, 1, 1] = c * x + s * y, c * y - s * x
@@ -402,7 +398,7 @@ def _segments(
     then every chain is divided where it is farthest from its chord (Douglas and Peucker) until ``LINE_ERROR`` holds.
     """
     sensor = rig.sensor
-    reach = rig.body.v_max * params.obstacle_horizon_s + rig.body.radius + params.margin + 2.0 * params.centre
+    reach = rig.body.v_max * params.obstacle_horizon_s + rig.body.radius + params.margin
     count = 0
     for n in range(sensor.beams):
         if sensor.range_min <= work[n] < reach and work[n] > 0.0:
@@ -418,7 +414,7 @@ def _segments(
     closed = 2.0 * (rig.body.radius + params.margin)
     error = LINE_ERROR
     while True:
-        if _divide(percept, memory, work, keep, hits, count, (last + 1) % count, closed, error, rig, params):
+        if _divide(percept, memory, work, keep, hits, count, (last + 1) % count, closed, error, rig):
             break
         error *= 2.0
     _sort(memory["lines"], memory["lines_n"])
@@ -460,7 +456,6 @@ def _divide(
     closed: float,
     error: float,
     rig: Rig,
-    params: Params,
 ) -> bool:
     """Write chains of returns as segments with at most ``error`` [m]; return whether there was room for all."""
     for k in range(count):
@@ -480,7 +475,7 @@ def _divide(
             if a == 0 or keep[a] & 2:
                 if memory["lines_n"] == MAX_LINES:
                     return False
-                _put_dot(percept, memory, work, hits[(begin_at + a) % count], rig, params)
+                _put_dot(percept, memory, work, hits[(begin_at + a) % count], rig)
             a = b
             continue
         na, nb = hits[(begin_at + a) % count], hits[(begin_at + b) % count]
@@ -497,27 +492,26 @@ def _divide(
             continue
         if memory["lines_n"] == MAX_LINES:
             return False
-        _put(percept, memory, ax, ay, bx, by, params)
+        _put(percept, memory, ax, ay, bx, by)
         a = b
     return True
 
 
 @jit_inner
-def _put_dot(percept: Row, memory: Row, work: np.ndarray, n: int, rig: Rig, params: Params) -> None:
+def _put_dot(percept: Row, memory: Row, work: np.ndarray, n: int, rig: Rig) -> None:
     """Add a segment as wide as its beam for a return that stands alone."""
     half = max(0.005, 0.5 * work[n] * rig.sensor.increment)
     x, y = work[n] * rig.cos[n], work[n] * rig.sin[n]
     dx, dy = half * rig.sin[n], -half * rig.cos[n]
-    _put(percept, memory, x + dx, y + dy, x - dx, y - dy, params)
+    _put(percept, memory, x + dx, y + dy, x - dx, y - dy)
 
 
 @jit_inner
-def _put(percept: Row, memory: Row, ax: float, ay: float, bx: float, by: float, params: Params) -> None:
+def _put(percept: Row, memory: Row, ax: float, ay: float, bx: float, by: float) -> None:
     """Add segment a-b (body frame) to the robot's, unless it has no length."""
     if (bx - ax) * (bx - ax) + (by - ay) * (by - ay) < 1e-8:
         return
     c, s = math.cos(percept["goal_bearing"]), math.sin(percept["goal_bearing"])
-    ax, bx = ax - params.centre, bx - params.centre
     n = memory["lines_n"]
     memory["lines"][n, 0, 0], memory["lines"][n, 0, 1] = c * ax + s * ay, c * ay - s * ax
     memory["lines"][n, 1, 0], memory["lines"][n, 1, 1] = c * bx + s * by, c * by - s * bx
@@ -531,16 +525,9 @@ def _command(percept: Row, memory: Row, decision: Row, rig: Rig, params: Params)
     c, s = math.cos(bearing), math.sin(bearing)
     x, y = c * memory["ux"] - s * memory["uy"], s * memory["ux"] + c * memory["uy"]
     speed = min(rig.body.v_max, math.sqrt(x * x + y * y))
-    slow = not speed >= params.creep * memory["speed"]
     heading = math.atan2(y, x) if speed > 1e-6 else 0.0
-    if slow:
+    if not speed >= params.creep * memory["speed"] and memory["free"] == 0:
         speed = 0.0
         if decision["state"] == ADVANCE:
             decision["state"], decision["reason"] = YIELD, R_BLOCKED_WAIT
-    if params.centre > 0.0 and not slow:
-        w = y / params.centre
-        over = max(1.0, abs(w) / rig.body.w_max)
-        decision["heading"] = heading
-        decision["v"], decision["w"] = max(0.0, x) / over, w / over
-    else:
-        head_for(decision, percept, heading, speed, rig)
+    head_for(decision, percept, heading, speed, rig)
