@@ -416,7 +416,7 @@ def _segments(
     while True:
         if _divide(percept, memory, work, keep, hits, count, (last + 1) % count, closed, error, rig):
             break
-        error *= 2.0
+        error *= 1.5
     _sort(memory["lines"], memory["lines_n"])
 
 
