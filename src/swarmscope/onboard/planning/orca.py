@@ -63,7 +63,7 @@ class Params(NamedTuple):
     margin: float = 0.035
     """Kept free around the body, what the wheels cannot follow exactly included."""
     creep: float = 0.2
-    """Answers slower than this share of the preferred speed are not driven while an obstacle is in the way."""
+    """Slower than this share of the preferred speed nobody drives at an obstacle between it and its goal."""
     deadlock: float = 1.0
     """1: without progress follow the border; 0: plain ORCA."""
     stall_s: float = 2.0
@@ -526,7 +526,7 @@ def _command(percept: Row, memory: Row, decision: Row, rig: Rig, params: Params)
     x, y = c * memory["ux"] - s * memory["uy"], s * memory["ux"] + c * memory["uy"]
     speed = min(rig.body.v_max, math.sqrt(x * x + y * y))
     heading = math.atan2(y, x) if speed > 1e-6 else 0.0
-    if not speed >= params.creep * memory["speed"] and memory["free"] == 0:
+    if not speed >= params.creep * memory["speed"] and memory["free"] == 0 and memory["side"] == 0:
         speed = 0.0
         if decision["state"] == ADVANCE:
             decision["state"], decision["reason"] = YIELD, R_BLOCKED_WAIT
