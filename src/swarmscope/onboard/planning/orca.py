@@ -39,7 +39,7 @@ from swarmscope.onboard.planning._contract import (
     R_YIELD,
     YIELD,
 )
-from swarmscope.onboard.planning.nav_scope import away_from_nearest, first_safe, turn_to_safe
+from swarmscope.onboard.planning.nav_scope import first_safe, turn_to_safe
 from swarmscope.onboard.tick import begin, finish
 
 NAME = "orca"
@@ -49,6 +49,8 @@ MAX_LINES = 40
 """Segments that the library is given for one robot; with more, all are made coarser."""
 LINE_ERROR = 0.015
 """Returns lie within this of their segment [m]."""
+LOST_BEAMS = 6
+"""Every so many beams a way out is tried where no direction is safe."""
 LEAVE_GAIN = 0.5
 """How much closer to the goal than ever before the free way must lead for a strict following to end [m]."""
 
@@ -97,6 +99,8 @@ MEMORY = np.dtype(
         ("turn_s", np.float64),  # when the following changes its side
         ("loop_s", np.float64),  # after how long it does
         ("evade_s", np.float64),  # until when a jam is evaded
+        ("lost", np.float64),  # direction that is taken where no direction is safe, compass frame [rad]
+        ("lost_s", np.float64),  # until when
         ("speed", np.float64),  # preferred speed [m/s]
         ("turn", np.float64),  # direction of the preferred velocity, goal frame [rad]
         ("vx", np.float32),  # own velocity, goal frame [m/s]
@@ -357,10 +361,28 @@ def _follow(
         memory["wind"] = back + angle_from(0.0, side * (heading - start))
         memory["target"] = target
     else:
-        heading = away_from_nearest(work, rig)
+        if percept["now_s"] >= memory["lost_s"]:  # held for a while: two ways out would take turns
+            memory["lost_s"] = percept["now_s"] + params.stall_s
+            memory["lost"] = percept["compass"] + _longest_way(work, rig)
+        heading = memory["lost"] - percept["compass"]
         decision["reason"] = R_LOST
     memory["turn"] = wrap_angle(heading - bearing)
     memory["speed"] = rig.body.v_max
+
+
+@jit_inner
+def _longest_way(work: np.ndarray, rig: Rig) -> float:
+    """Return the direction (body frame) in which the guard would let the robot drive farthest."""
+    sensor = rig.sensor
+    best, at = -1.0, 0.0
+    for n in range(0, sensor.beams, LOST_BEAMS):
+        bearing = sensor.angle_min + n * sensor.increment
+        way = corridor_length(
+            work, sensor.range_min, rig.cos, rig.sin, bearing, rig.body.radius + rig.clearance, sensor.range_max
+        )
+        if way > best:
+            best, at = way, bearing
+    return at
 
 
 @jit_inner
