@@ -121,8 +121,8 @@ def as_arrays(pairs, mirror=False):
 
 @given(feature_lists, st.floats(-1.0, 1.0))
 def test_the_mirrored_scene_has_the_opposite_own_probability(pairs, bias):
-    p = own_probability(*as_arrays(pairs), HALF_ALPHA, bias)
-    assert own_probability(*as_arrays(pairs, True), HALF_ALPHA, -bias) == pytest.approx(1.0 - p, abs=1e-9)
+    p = own_probability(*as_arrays(pairs), HALF_ALPHA, bias, False)
+    assert own_probability(*as_arrays(pairs, True), HALF_ALPHA, -bias, False) == pytest.approx(1.0 - p, abs=1e-9)
 
 
 def decide(pairs, neighbours, goal_bearing=0.0, compass=0.0, mirror=False, w_i=1.0, bias=0.0):
@@ -146,6 +146,7 @@ def decide(pairs, neighbours, goal_bearing=0.0, compass=0.0, mirror=False, w_i=1
         rows.rig,
         w_i,
         sign * bias,
+        False,
         angles,
         distances,
         count,

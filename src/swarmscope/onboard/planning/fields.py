@@ -61,3 +61,27 @@ def yields_to(propulsion: float, force: float, cosine: float) -> bool:
 def neighbour_weight(error_self: float, error_neighbour: float) -> float:
     """Return the optimal amplitude of f_ai by AdaBoost (21), natural logarithms (readings 11)."""
     return math.log((1.0 - error_neighbour) / error_neighbour) / math.log((1.0 - error_self) / error_self)
+
+
+@jit
+def propulsion(w_a: float, p_s: float) -> float:
+    """Return |F_a| (SFM-MAS 6) towards the target from its weight and P_s (7)."""
+    return w_a * p_s
+
+
+@jit
+def obstacle_constant(force: float, l_th: float, half_alpha: float) -> float:
+    """Return V_0B (SFM-MAS 5) [m^2]: repulsion equals the propulsion ``force`` at ``l_th`` [m] on the sector edge."""
+    return l_th * l_th / math.cos(half_alpha) * force
+
+
+@jit
+def obstacle_potential(distance: float, constant: float) -> float:
+    """Return V_aB (SFM-MAS 4) [m] at ``distance`` [m] from an obstacle; it rises towards 0 far away."""
+    return -constant / distance
+
+
+@jit
+def obstacle_force(distance: float, constant: float) -> float:
+    """Return F_aB (SFM-MAS 3, 4) towards the obstacle, so always negative: minus the slope of the potential."""
+    return -constant / (distance * distance)

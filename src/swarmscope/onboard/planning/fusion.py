@@ -21,14 +21,19 @@ from swarmscope.onboard.planning.fields import (
 
 
 @jit
-def own_probability(angles: np.ndarray, distances: np.ndarray, count: int, half_alpha: float, bias: float) -> float:
-    """Return P_a (9) from our features in the target-aligned frame, sorted in [0, 2 pi), normalised distances."""
+def own_probability(
+    angles: np.ndarray, distances: np.ndarray, count: int, half_alpha: float, bias: float, polygon: bool
+) -> float:
+    """Return P_a (9), SFM-MAS (7), from our features in the target-aligned frame, sorted in [0, 2 pi), normalised.
+
+    ``polygon`` takes areas from triangles (SFM-MAS 24), with borders linear in the angle, as Table II needs.
+    """
     quarter = 0.5 * math.pi
     return left_probability(
-        quadrant_area(angles, distances, count, 0.0, half_alpha, False),
-        quadrant_area(angles, distances, count, -half_alpha, 0.0, False),
-        quadrant_area(angles, distances, count, half_alpha, quarter, False),
-        quadrant_area(angles, distances, count, -quarter, -half_alpha, False),
+        quadrant_area(angles, distances, count, 0.0, half_alpha, polygon),
+        quadrant_area(angles, distances, count, -half_alpha, 0.0, polygon),
+        quadrant_area(angles, distances, count, half_alpha, quarter, polygon),
+        quadrant_area(angles, distances, count, -quarter, -half_alpha, polygon),
         bias,
     )
 
@@ -41,6 +46,7 @@ def choose_side(
     rig: Rig,
     w_i: float,
     bias: float,
+    polygon: bool,
     angles: np.ndarray,
     distances: np.ndarray,
     count: int,
@@ -50,13 +56,14 @@ def choose_side(
     """Return the side to pass the obstacle on, +1 left or -1 right, and note the numbers in ``decision``.
 
     ``angles``, ``distances``: our ``count`` features, compass frame, m. Left iff P_dir >= 0.5 (MAP, readings 10).
+    ``polygon`` reads features as SFM-MAS does: areas (24), passable distances (22) with borders on the chords.
     """
     target = percept["compass"] + percept["goal_bearing"]
     half_alpha = 0.5 * rig.protection.alpha
     range_max = rig.sensor.range_max
     align_features(angles, distances, count, -target, out_angles, out_distances)
     _normalise_all(out_distances, count, range_max)
-    p_self = own_probability(out_angles, out_distances, count, half_alpha, bias)
+    p_self = own_probability(out_angles, out_distances, count, half_alpha, bias, polygon)
     threshold = normalise(rig.protection.w_n, range_max)
     weighted, weights = 0.0, 0.0
     heard = 0
@@ -76,8 +83,8 @@ def choose_side(
             shared["heard_angle"][slot], shared["heard_distance"][slot], n, -target, out_angles, out_distances
         )
         _normalise_all(out_distances, n, range_max)
-        x_1 = passable_distance(out_angles, out_distances, n, 0.0, half_alpha, False)
-        x_2 = passable_distance(out_angles, out_distances, n, -half_alpha, 0.0, False)
+        x_1 = passable_distance(out_angles, out_distances, n, 0.0, half_alpha, polygon)
+        x_2 = passable_distance(out_angles, out_distances, n, -half_alpha, 0.0, polygon)
         force = interaction_force(distance, rig.protection.sigma_a, w_i)
         follow = following_probability(x_1, x_2, threshold, bearing >= 0.0)
         weighted += force * follow
