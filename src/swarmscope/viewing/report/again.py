@@ -1,4 +1,4 @@
-"""Runs played again from their scenarios, for pictures of what happened; the same to the bit as when they were measured."""
+"""Runs played again from their scenarios, for pictures of what happened; the same to the bit as the measured ones."""
 
 from __future__ import annotations
 

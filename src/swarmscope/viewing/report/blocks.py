@@ -1,4 +1,4 @@
-"""What a report is made of: sections of blocks, plain text throughout, that the page and the Markdown file render alike."""
+"""What a report is made of: sections of blocks of plain text, which the page and the Markdown file render alike."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ class Line(NamedTuple):
     """One line of a table's cell."""
 
     text: str
-    kind: Literal["main", "plain", "sub"] = "main"
+    kind: Literal["main", "beside", "plain", "sub", "code"] = "main"
+    """``beside`` stands on the line of the one before."""
     mark: Mark = ""
 
 
@@ -28,6 +29,13 @@ class Row(NamedTuple):
     strong: bool = False
     swatch: str = ""
     """Colour of the planner that the row is about."""
+
+
+@dataclass(frozen=True)
+class Heading:
+    """A heading within a chapter."""
+
+    text: str
 
 
 @dataclass(frozen=True)
@@ -95,7 +103,7 @@ class Folded:
     blocks: Sequence[Block]
 
 
-Block = Text | Points | Command | Facts | Table | Picture | Folded
+Block = Heading | Text | Points | Command | Facts | Table | Picture | Folded
 
 
 @dataclass(frozen=True)
@@ -150,6 +158,6 @@ def pictures_of(document: Document) -> list[Picture]:
     return [block for block in blocks if isinstance(block, Picture)]
 
 
-def cell(text: str, *subs: str) -> Value:
-    """Return a cell with one main line and small lines below it."""
-    return [Line(text), *(Line(sub, "sub") for sub in subs if sub)]
+def cell(text: str, beside: str = "", *subs: str) -> Value:
+    """Return a cell with one main line, something small on the same line, and small lines below it."""
+    return [Line(text), *([Line(beside, "beside")] if beside else []), *(Line(sub, "sub") for sub in subs if sub)]

@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-
 from swarmscope.errors import SwarmscopeError
 from swarmscope.evaluation.results import Run
 from swarmscope.evaluation.scenario import parse_scenario
@@ -15,7 +14,7 @@ from swarmscope.viewing.pictures import FAINT, INK, _draw_obstacles
 from swarmscope.viewing.report import words
 from swarmscope.viewing.report.again import Again, Played
 from swarmscope.viewing.report.blocks import Block, Line, Picture, Row, Table, Text, cell
-from swarmscope.viewing.report.drawing import FRAME, PAPER, new_figure, picture
+from swarmscope.viewing.report.drawing import FRAME, PAPER, new_figure, picture, symbols
 from swarmscope.viewing.report.material import ALL, OURS_COLOUR, Material
 
 if TYPE_CHECKING:
@@ -72,8 +71,8 @@ def case_picture(run: Run, case: Case, again: Again) -> Picture:
     _draw_place(axes, run, case, played)
     side, other = ("left", "right") if case["side"] > 0 else ("right", "left")
     caption = (
-        f"{case['kind'].capitalize()}: {run.place}, seed {run.seed}, robot {case['robot']} at {case['t_s']:.1f} s. Alone "
-        f"it would have gone {other} (P_a = {case['p_self']:.3f}, dashed arrow); with its neighbours it went {side} "
+        f"{case['kind'].capitalize()}: {run.place}, seed {run.seed}, robot {case['robot']} at {case['t_s']:.1f} s. "
+        f"Alone it would have gone {other} (P_a = {case['p_self']:.3f}, dashed arrow); with its neighbours it went {side} "
         f"(P_dir = {case['p_left']:.3f}, arrow): {KINDS[case['kind']]}. Grey arrow: direction of the goal. Green: "
         f"neighbours that took part, the wider the link the larger f_ai; grey discs: other robots; dotted rings: pass "
         f"band. Line: its path in the {AFTER_S:g} s after, dotted before."
@@ -93,7 +92,7 @@ def case_table(case: Case) -> Table:
         Row([cell("P_dir"), cell("left" if case["side"] > 0 else "right"), cell(f"{case['p_left']:.3f}"),
              cell(f"{1.0 + sum(n['f'] for n in case['neighbours']):.3f}"), cell(_signed(total))], True)
     )  # fmt: skip
-    note = "P: probability that left is better. Contribution: f (P − 1/2), positive to the left; the sum's sign decides."
+    note = "P: probability that left is better. Contribution: f (P − 1/2), positive to the left; its sum decides."
     header = ["robot", "side", "P_a, P_ni", "weight f_ai", "contribution"]
     return Table("The fusion in numbers.", header, rows, note)
 
@@ -117,8 +116,9 @@ def _draw_place(axes: Axes, run: Run, case: Case, played: Played) -> None:
     near = [(n["id"], float(played.x[tick, n["id"]]), float(played.y[tick, n["id"]])) for n in case["neighbours"]]
     sigma = _sigma(run)
     reach = max([3.0 * sigma + 0.2, *(math.hypot(nx - x, ny - y) + 0.6 for _, nx, ny in near)])
-    axes.set_xlim(x - reach, x + reach)
-    axes.set_ylim(y - reach, y + reach)
+    cx, cy = x + 0.3 * reach * math.cos(case["target"]), y + 0.3 * reach * math.sin(case["target"])
+    axes.set_xlim(cx - 1.15 * reach, cx + 1.15 * reach)
+    axes.set_ylim(cy - 1.15 * reach, cy + 1.15 * reach)
     axes.set_aspect("equal")
     _draw_obstacles(axes, played.world.obstacles)
     for ring in (sigma, 3.0 * sigma):
@@ -134,10 +134,10 @@ def _draw_place(axes: Axes, run: Run, case: Case, played: Played) -> None:
     for i, nx, ny in near:
         axes.plot([nx, x], [ny, y], color=NEIGHBOUR, lw=1.0 + 3.0 * forces[i] / largest, alpha=0.45, zorder=3)
         _robot(axes, i, nx, ny, played.radius, NEIGHBOUR)
-    _arrow(axes, x, y, case["target"], 1.5 * sigma, FAINT, "-", 1.4)
-    turn = 0.6
-    _arrow(axes, x, y, case["target"] - case["side"] * turn, 1.35 * sigma, BEFORE, (0, (3, 2)), 2.0)
-    _arrow(axes, x, y, case["target"] + case["side"] * turn, 1.35 * sigma, OURS_COLOUR, "-", 2.4)
+    turn, target = 0.7 * case["side"], case["target"]
+    _arrow(axes, x, y, target, 1.6 * sigma, FAINT, "-", 1.4, "goal")
+    _arrow(axes, x, y, target - turn, 1.35 * sigma, BEFORE, (0, (3, 2)), 2.0, "P_a")
+    _arrow(axes, x, y, target + turn, 1.35 * sigma, OURS_COLOUR, "-", 2.4, "P_dir")
     _robot(axes, me, x, y, played.radius, OURS_COLOUR)
     _scale_bar(axes, reach)
 
@@ -145,7 +145,7 @@ def _draw_place(axes: Axes, run: Run, case: Case, played: Played) -> None:
 def _draw_path(axes: Axes, played: Played, me: int, tick: int) -> None:
     first = max(0, tick - round(BEFORE_S / played.dt))
     last = tick + round(AFTER_S / played.dt) + 1
-    line = {"color": OURS_COLOUR, "zorder": 3}
+    line: dict[str, Any] = {"color": OURS_COLOUR, "zorder": 3}
     axes.plot(played.x[first : tick + 1, me], played.y[first : tick + 1, me], ls=(0, (1, 2)), lw=1.6, **line)
     axes.plot(played.x[tick:last, me], played.y[tick:last, me], lw=1.8, alpha=0.75, **line)
 
@@ -154,14 +154,28 @@ def _robot(axes: Axes, number: int, x: float, y: float, radius: float, colour: s
     from matplotlib import patches
 
     axes.add_patch(patches.Circle((x, y), radius, fc=colour, ec=PAPER, lw=0.8, zorder=6))
-    words_of = {"ha": "center", "va": "center", "fontsize": 7.5, "color": PAPER, "zorder": 7, "clip_on": True}
-    axes.text(x, y, str(number), **words_of)  # type: ignore[arg-type]
+    words_of: dict[str, Any] = {
+        "ha": "center",
+        "va": "center",
+        "fontsize": 7.5,
+        "color": PAPER,
+        "zorder": 7,
+        "clip_on": True,
+    }
+    axes.text(x, y, str(number), **words_of)
 
 
-def _arrow(axes: Axes, x: float, y: float, angle: float, length: float, colour: str, dashes: Any, wide: float) -> None:
+def _arrow(
+    axes: Axes, x: float, y: float, angle: float, length: float, colour: str, dashes: Any, wide: float, name: str
+) -> None:
+    from matplotlib.patheffects import withStroke
+
     tip = (x + length * math.cos(angle), y + length * math.sin(angle))
     axes.plot([x, tip[0]], [y, tip[1]], color=colour, lw=wide, ls=dashes, zorder=5)
     axes.plot(*tip, marker=(3, 0, math.degrees(angle) - 90.0), ms=9, color=colour, mec=PAPER, mew=0.6, zorder=5)
+    end = (x + 1.17 * length * math.cos(angle), y + 1.17 * length * math.sin(angle))
+    text = axes.text(*end, symbols(name), color=colour, ha="center", va="center", fontsize=10, zorder=9)
+    text.set_path_effects([withStroke(linewidth=2.5, foreground=PAPER)])
 
 
 def _scale_bar(axes: Axes, reach: float) -> None:

@@ -18,17 +18,27 @@ from swarmscope.viewing.report.blocks import (
     Document,
     Facts,
     Folded,
+    Heading,
     Points,
     Section,
     Table,
     Text,
 )
 from swarmscope.viewing.report.cases import case_blocks
-from swarmscope.viewing.report.material import ALL, Material
+from swarmscope.viewing.report.material import ALL, POOLED, Material
 from swarmscope.viewing.report.paths import path_picture
 from swarmscope.viewing.report.summary import summary_blocks
 
 Progress = Callable[[str], None]
+HEADINGS = {
+    "boxes": "Spread over the maps",
+    "paths": "Paths",
+    "sweeps": "Sweeps",
+    "field": "Interaction force",
+    "cases": "Convergence and divergence",
+    "weight": "Weight of the neighbours, from data",
+    "resources": "Computation and communication",
+}
 MOST_NAMED = 12
 """More failures than this are folded away."""
 
@@ -47,9 +57,7 @@ def make_document(material: Material, progress: Progress) -> Document:
         Section("Known differences", "notes", _notes(experiment)),
     ]
     sections = [section for section in sections if section.blocks]
-    return Document(
-        experiment.title, experiment.name, _about(material), _facts(material), _again(experiment), sections
-    )
+    return Document(experiment.title, experiment.name, _about(material), _facts(material), _again(experiment), sections)
 
 
 def _about(material: Material) -> str:
@@ -64,9 +72,9 @@ def _about(material: Material) -> str:
         return f"{text}There are no runs yet."
     text += (
         f"{words.listed(ran)} in {words.listed(material.places)}: {words.count(len(main), 'run')} over the worlds of "
-        f"seeds {words.spans(run.seed for run in main)}, {words.count(robots, 'journey')} of single robots, of which "
-        f"{words.grouped(lost) if lost else 'none'} did not arrive and {words.grouped(hit) if hit else 'none'} touched "
-        "something."
+        f"seeds {words.spans(run.seed for run in main)}, {words.count(robots, 'journey')} of single robots. "
+        + (f"{words.grouped(lost)} of them did not end at the goal; " if lost else "All of them ended at the goal; ")
+        + (f"{words.count(hit, 'robot')} touched something." if hit else "no robot touched anything.")
     )
     absent = [p for p in material.planners if p not in ran]
     text += f" Not run: {words.listed(absent)}." if absent else ""
@@ -116,7 +124,12 @@ def _results(material: Material) -> list[Block]:
             "Robots that are lost early have short ways, so read it beside the arrival rate."
         )
     intro += " Differences from published values are judged against the interval: green is better, red is worse."
-    return [Text(intro), *(tables.metric_table(material, metric) for metric in shown)]
+    known = [m for m in shown if any(m in run.figures for run in material.main_runs()) or m in POOLED]
+    blocks: list[Block] = [Text(intro), *(tables.metric_table(material, metric) for metric in known)]
+    absent = [words.in_text(metric) for metric in shown if metric not in known]
+    if absent:
+        blocks.append(Text(f"Not measured in these runs: {words.listed(absent)}.", "note"))
+    return blocks
 
 
 def _differences(material: Material) -> list[Block]:
@@ -144,7 +157,7 @@ def _failures(material: Material) -> list[Block]:
     table = Table(f"Robots of {ours} that did not arrive.", ["place", "seed", "robot", "why"], named, words=True)
     if len(named) <= MOST_NAMED:
         return [*blocks, table]
-    return [*blocks, Folded(f"The {words.count(len(named), 'robot')} of {ours} that did not arrive, one by one", [table])]
+    return [*blocks, Folded(f"The {len(named)} robots of {ours} that did not arrive, one by one", [table])]
 
 
 def _figures(material: Material, progress: Progress) -> list[Block]:
@@ -161,9 +174,10 @@ def _figures(material: Material, progress: Progress) -> list[Block]:
     for name in dict.fromkeys(material.experiment.figures):
         progress(f"figure: {name}")
         try:
-            blocks += makers[name]()
+            made = makers[name]()
         except SwarmscopeError as error:
-            blocks.append(Text(f"'{name}' could not be drawn: {error}", "note"))
+            made = [Text(f"This could not be drawn: {error}", "note")]
+        blocks += [Heading(HEADINGS[name]), *made] if made else []
     return blocks
 
 

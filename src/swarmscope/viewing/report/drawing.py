@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
 PAPER, GRID, FRAME, WALL = "#fffffe", "#e6e8ea", "#c4c9cd", "#8c9a86"
 PX_PER_INCH = 96
+SYMBOL = r"(?<![\w.])([NPfwtσ])_(ni|ai|dir|plan|a|u|i)(?!\w)"
+"""Symbols with an index."""
+GREEK = {"σ": r"\sigma"}
 DARK = {
     INK: "#e4e7ea",
     FAINT: "#98a3ad",
@@ -100,6 +103,11 @@ def note_grid(axes: Axes) -> None:
     """Draw light horizontal lines behind the data."""
     axes.grid(axis="y", linewidth=0.8)
     axes.tick_params(length=0)
+
+
+def symbols(text: str) -> str:
+    """Return ``text`` with symbols such as w_i set as formulas."""
+    return re.sub(SYMBOL, lambda m: rf"${GREEK.get(m[1], m[1])}_{{{m[2]}}}$", text)
 
 
 def _themed(svg: str) -> str:

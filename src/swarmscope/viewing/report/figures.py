@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,19 +14,21 @@ from swarmscope.evaluation.scenario import RobotModel
 from swarmscope.onboard.planning._contract import load_planner
 from swarmscope.onboard.planning.fields import interaction_force
 from swarmscope.onboard.robot import Body, protection_model
+from swarmscope.viewing.pictures import FAINT, INK
 from swarmscope.viewing.report import words
 from swarmscope.viewing.report.blocks import Picture
-from swarmscope.viewing.report.drawing import FAINT, INK, PAPER, new_figure, note_grid, picture
+from swarmscope.viewing.report.drawing import PAPER, new_figure, note_grid, picture, symbols
 from swarmscope.viewing.report.material import OURS_COLOUR, Material
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+ESTIMATE = "#009e73"
 BOXED = ("path_redundancy", "spl", "duration_s")
 
 
 def box_pictures(material: Material) -> list[Picture]:
-    """Return box plots of gamma, SPL and duration (Nav-SCOPE Fig. 7(a)); figures that nothing is known of are left out."""
+    """Return box plots of gamma, SPL and duration (Nav-SCOPE Fig. 7(a)), of those that were measured."""
     chosen = []
     for metric in BOXED:
         if any(len(material.per_map(place, p, metric)) for place in material.places for p in material.planners):
@@ -87,7 +90,7 @@ def _legend(axes: Axes, material: Material, planners: list[str], metric: str) ->
     ]
     if material.published_places(metric):
         marks.append(Line2D([], [], color=INK, lw=1.8, label="published"))
-    axes.figure.legend(  # type: ignore[union-attr]
+    axes.figure.legend(
         handles=marks, loc="outside upper left", ncols=len(marks), handletextpad=0.4, columnspacing=1.6,
         handlelength=1.2,
     )  # fmt: skip
@@ -130,13 +133,14 @@ def _sweep(material: Material, sweep: Sweep) -> Picture | None:
         steps = np.arange(len(labels))
         axes.vlines(steps, bounds[:, 0], bounds[:, 1], color=colour, lw=1.6, alpha=0.7)
         axes.plot(steps, estimates, "-o", color=colour, ms=5, lw=1.4)
-        _mark_default(axes, sweep, default)
+        _mark(axes, sweep, default, FAINT)
+        _mark(axes, sweep, _estimated(material, sweep), ESTIMATE)
         published = material.published("path_redundancy", place, sweep.planner)
         if published is not None:
             axes.axhline(100.0 * published, color=FAINT, lw=1.0, ls=(0, (4, 3)), zorder=1)
         axes.set_xticks(steps, [f"{value:g}" for value in sweep.values])
         axes.set_title(place, loc="left")
-        axes.set_xlabel(sweep.name)
+        axes.set_xlabel(symbols(sweep.name))
         note_grid(axes)
     panels[0].set_ylabel(_axis("path_redundancy"))
     runs = sorted({len(material.of(place, label)) for place in material.places for label in labels} - {0})
@@ -147,17 +151,31 @@ def _sweep(material: Material, sweep: Sweep) -> Picture | None:
     )
     if default is not None:
         caption += f" Band: the default, {default:g}."
+    estimate = _estimated(material, sweep)
+    if estimate is not None:
+        caption += f" Green: the value estimated from data, {estimate:.2f}."
     if material.published("path_redundancy", material.places[0], sweep.planner) is not None:
         caption += " Dashed: the published γ."
     return picture(figure, f"sweep_{_stem(sweep.name)}", caption, f"γ against {sweep.name}")
 
 
-def _mark_default(axes: Axes, sweep: Sweep, default: float | None) -> None:
-    if default is None or not min(sweep.values) <= default <= max(sweep.values):
+def _mark(axes: Axes, sweep: Sweep, value: float | None, colour: str) -> None:
+    """Shade the place of ``value`` on the axis of equal steps."""
+    if value is None or not min(sweep.values) <= value <= max(sweep.values):
         return
     order = np.argsort(sweep.values)
-    place = float(np.interp(default, np.array(sweep.values)[order], order.astype(float)))
-    axes.axvspan(place - 0.18, place + 0.18, color=FAINT, alpha=0.16, lw=0, zorder=0)
+    place = float(np.interp(value, np.array(sweep.values)[order], order.astype(float)))
+    half = 0.2 if colour == FAINT else 0.05
+    axes.axvspan(place - half, place + half, color=colour, alpha=0.2, lw=0, zorder=0)
+
+
+def _estimated(material: Material, sweep: Sweep) -> float | None:
+    """Return w_i as estimated from data for a sweep of w_i."""
+    weight = material.weight
+    if weight is None or not sweep.key.endswith(".w_i") or not weight.peak_force > 0.0:
+        return None
+    value = weight.weight / weight.peak_force
+    return value if math.isfinite(value) else None
 
 
 def _default(material: Material, sweep: Sweep) -> float | None:
@@ -210,12 +228,12 @@ def field_picture(material: Material) -> Picture:
         arrowprops={"arrowstyle": "-", "color": FAINT, "lw": 0.8},
     )  # fmt: skip
     axes.text(2.0 * sigma, -0.6 * high, "pass band: takes part in the fusion", ha="center", va="top", fontsize=8.5)
-    axes.text(0.82 * sigma, -1.9 * high, "repulsion", fontsize=8.5, color=FAINT)
+    axes.text(0.53 * sigma, -0.6 * high, "repulsion", va="top", fontsize=8.5, color=FAINT)
     ticks = [sigma, 2.0 * sigma, 3.0 * sigma, 4.0 * sigma]
-    names = ["σ_a", "2 σ_a", "3 σ_a", "4 σ_a"]
+    names = [symbols(name) for name in ("σ_a", "2 σ_a", "3 σ_a", "4 σ_a")]
     axes.set_xticks(ticks, [f"{name}\n{tick:.2f} m" for name, tick in zip(names, ticks, strict=True)])
     axes.set_xlabel("distance of the neighbour")
-    axes.set_ylabel("f_ai [1/m]")
+    axes.set_ylabel(symbols("f_ai [1/m]"))
     note_grid(axes)
     caption = (
         f"Interaction force f_ai (12) of the experiment's robot for w_i = {w_i:g}: negative pushes apart, positive "
@@ -228,4 +246,3 @@ def field_picture(material: Material) -> Picture:
 def _stem(name: str) -> str:
     stem = "".join(c if c.isascii() and c.isalnum() else "_" for c in name)
     return stem or "value"
-

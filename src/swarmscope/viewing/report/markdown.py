@@ -11,6 +11,7 @@ from swarmscope.viewing.report.blocks import (
     Document,
     Facts,
     Folded,
+    Heading,
     Line,
     Picture,
     Points,
@@ -41,6 +42,11 @@ def markdown(document: Document) -> str:
 @singledispatch
 def _block(block: Block, named: Numbers) -> str:
     raise TypeError(f"no way to show a {type(block).__name__}")
+
+
+@_block.register
+def _heading(block: Heading, named: Numbers) -> str:
+    return f"### {_plain(block.text)}"
 
 
 @_block.register
@@ -78,18 +84,20 @@ def _table(block: Table, named: Numbers) -> str:
     lines = [
         "| " + " | ".join(_plain(name) or " " for name in block.header) + " |",
         "| --- |" + f" {align} |" * (len(block.header) - 1),
-        *(_row(row) for row in block.rows),
+        *(_row(row, block.words) for row in block.rows),
     ]
     caption = f"**{named.get(id(block), 'Table')}.** {_plain(block.caption)}"
     return "\n\n".join([caption, "\n".join(lines), *([_plain(block.note)] if block.note else [])])
 
 
-def _row(row: Row) -> str:
-    return "| " + " | ".join(_value(value, row.strong) for value in row.values) + " |"
+def _row(row: Row, words: bool) -> str:
+    shown = (_value(value, row.strong and not (words and k)) for k, value in enumerate(row.values))
+    return "| " + " | ".join(shown) + " |"
 
 
 def _value(value: Value, strong: bool) -> str:
-    return "<br>".join(_line(line, strong) for line in value) or " "
+    parts = (f"{' ' if line.kind == 'beside' else '<br>'}{_line(line, strong)}" for line in value)
+    return "".join(parts).removeprefix("<br>") or " "
 
 
 def _line(line: Line, strong: bool) -> str:

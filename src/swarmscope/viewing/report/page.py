@@ -13,6 +13,7 @@ from swarmscope.viewing.report.blocks import (
     Document,
     Facts,
     Folded,
+    Heading,
     Line,
     Picture,
     Points,
@@ -23,9 +24,16 @@ from swarmscope.viewing.report.blocks import (
     Value,
     numbers,
 )
-from swarmscope.viewing.report.drawing import data_uri
+from swarmscope.viewing.report.drawing import DARK, SYMBOL, data_uri
 
 Numbers = dict[int, str]
+SHORT = 24
+NAME = r"(?<![\w&;./-])\w{1,8}(?:-\w{1,8}){1,2}(?![\w./-])"
+"""Names with hyphens, which are not broken there."""
+ZOOM = 1.24
+"""Width of a figure on a wide page over the width that it is drawn for."""
+WIDE_PX = 560
+"""A wider figure is scrolled on a narrow page, not shrunk until its type cannot be read."""
 
 
 def page(document: Document) -> str:
@@ -36,7 +44,7 @@ def page(document: Document) -> str:
     parts = {
         "TITLE": escape(document.title),
         "NAME": escape(document.subtitle),
-        "ABOUT": escape(document.about),
+        "ABOUT": _words(document.about),
         "FACTS": _block(document.facts, named),
         "COMMAND": _block(document.commands, named),
         "CONTENTS": contents,
@@ -56,14 +64,19 @@ def _block(block: Block, named: Numbers) -> str:
 
 
 @_block.register
+def _heading(block: Heading, named: Numbers) -> str:
+    return f"<h3>{_words(block.text)}</h3>"
+
+
+@_block.register
 def _text(block: Text, named: Numbers) -> str:
-    return f'<p class="{block.kind}">{escape(block.text)}</p>'
+    return f'<p class="{block.kind}">{_words(block.text)}</p>'
 
 
 @_block.register
 def _points(block: Points, named: Numbers) -> str:
     entries = (
-        f'<li class="{mark or "open"}">{f"<b>{escape(lead)}</b> " if lead else ""}{escape(text)}</li>'
+        f'<li class="{mark or "open"}">{f"<b>{escape(lead)}</b> " if lead else ""}{_words(text)}</li>'
         for mark, lead, text in block.entries
     )
     return f'<ul class="points">{"".join(entries)}</ul>'
@@ -83,27 +96,34 @@ def _facts(block: Facts, named: Numbers) -> str:
 @_block.register
 def _folded(block: Folded, named: Numbers) -> str:
     inner = "\n".join(_block(inner, named) for inner in block.blocks)
-    return f"<details><summary>{escape(block.summary)}</summary>{inner}</details>"
+    return f"<details><summary>{_words(block.summary)}</summary>{inner}</details>"
 
 
 @_block.register
 def _table(block: Table, named: Numbers) -> str:
-    head = "".join(f'<th scope="col">{escape(name)}</th>' for name in block.header)
+    head = "".join(f'<th scope="col">{_words(name)}</th>' for name in block.header)
     rows = "".join(_row(row) for row in block.rows)
-    note = f'<p class="source">{escape(block.note)}</p>' if block.note else ""
+    note = f'<p class="source">{_words(block.note)}</p>' if block.note else ""
     kind = "words" if block.words else "figures"
-    caption = f'<div class="caption"><b>{named.get(id(block), "Table")}.</b> {escape(block.caption)}</div>'
+    caption = f'<div class="caption"><b>{named.get(id(block), "Table")}.</b> {_words(block.caption)}</div>'
     inner = f'<table class="{kind}"><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>'
     label = escape(block.caption)
-    return f'<div class="table">{caption}<div class="scroll" tabindex="0" role="region" aria-label="{label}">{inner}</div>{note}</div>'
+    scroll = f'<div class="scroll" tabindex="0" role="region" aria-label="{label}">{inner}</div>'
+    return f'<div class="table">{caption}{scroll}{note}</div>'
 
 
 def _row(row: Row) -> str:
     first, *others = row.values
-    swatch = f'<i style="background:{escape(row.swatch)}"></i>' if row.swatch else ""
+    swatch = _swatch(row.swatch) if row.swatch else ""
     values = "".join(f"<td>{_value(value)}</td>" for value in others)
     strong = ' class="strong"' if row.strong else ""
     return f'<tr{strong}><th scope="row">{swatch}{_value(first)}</th>{values}</tr>'
+
+
+def _swatch(colour: str) -> str:
+    dark = DARK.get(colour, colour)
+    style = f"background:{colour};background:light-dark({colour},{dark})"
+    return f'<span class="swatch" style="{escape(style)}"></span>'
 
 
 def _value(value: Value) -> str:
@@ -111,15 +131,25 @@ def _value(value: Value) -> str:
 
 
 def _line(line: Line) -> str:
-    return f'<span class="{f"{line.kind} {line.mark}".strip()}">{escape(line.text)}</span>'
+    text = escape(line.text) if line.kind == "code" else _words(line.text)
+    short = " short" if line.kind == "code" and len(line.text) < SHORT else ""
+    before = " " if line.kind == "beside" else ""
+    return f'{before}<span class="{f"{line.kind} {line.mark}{short}".strip()}">{text}</span>'
 
 
 @_block.register
 def _picture(block: Picture, named: Numbers) -> str:
-    image = f'<img src="{data_uri(block.svg)}" alt="{escape(block.alt)}" width="{block.width_px}">'
-    caption = f"<figcaption><b>{named[id(block)]}.</b> {escape(block.caption)}</figcaption>"
+    image = f'<img src="{data_uri(block.svg)}" alt="{escape(block.alt)}" width="{round(ZOOM * block.width_px)}">'
+    caption = f"<figcaption><b>{named[id(block)]}.</b> {_words(block.caption)}</figcaption>"
     scroll = f'<div class="scroll" tabindex="0" role="region" aria-label="{escape(block.alt)}">{image}</div>'
-    figure = f'<figure id="{escape(block.name)}">{scroll}{caption}</figure>'
+    wide = ' class="wide"' if block.width_px > WIDE_PX else ""
+    figure = f'<figure id="{escape(block.name)}"{wide}>{scroll}{caption}</figure>'
     if block.beside is None:
         return figure
     return f'<div class="beside">{figure}{_table(block.beside, named)}</div>'
+
+
+def _words(text: str) -> str:
+    """Return escaped text with symbols such as w_i set with an index."""
+    text = re.sub(SYMBOL, r"<i>\1</i><sub>\2</sub>", escape(text))
+    return re.sub(NAME, r'<span class="whole">\g<0></span>', text)

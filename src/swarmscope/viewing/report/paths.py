@@ -48,16 +48,15 @@ def path_picture(material: Material, again: Again, progress: Callable[[str], Non
     played = {key: again.of(run) for key, run in runs.items()}
     figure = new_figure(*_size(played, places, planners))
     panels = figure.subplots(len(places), len(planners), squeeze=False)
-    for row, place in zip(panels, places, strict=True):
+    for k, (row, place) in enumerate(zip(panels, places, strict=True)):
         for axes, planner in zip(row, planners, strict=True):
             _panel(axes, played.get((place, planner)), material.colour(planner))
             if (place, planner) in runs:
                 axes.set_title(_figures(runs[place, planner]), fontsize=7.5, color=FAINT, loc="right", pad=3)
             if axes is row[0]:
                 axes.set_ylabel(place, fontsize=11, rotation=0, ha="right", va="center", labelpad=8)
-            if row is panels[0]:
-                axes.text(0.0, 1.13, planner, transform=axes.transAxes, fontsize=11, fontweight="bold",
-                          color=material.colour(planner))  # fmt: skip
+            if k == 0:
+                axes.set_title(planner, loc="left", fontsize=10.5, fontweight="bold", color=material.colour(planner))
     lost = sum(int(np.sum(~p.arrived)) for p in played.values())
     caption = (
         f"Paths of all robots, seed {seed}: rows are places, columns planners, every row one world. It is the seed "

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
+from typing import NamedTuple
 
 from swarmscope.evaluation.metrics import metric_named
+from swarmscope.evaluation.statistics import PairedDifference
 from swarmscope.viewing.report import words
 from swarmscope.viewing.report.blocks import Block, Line, Mark, Points, Row, Table, Text, cell
-
 from swarmscope.viewing.report.material import ALL, Material
 from swarmscope.viewing.report.tables import Paired, comparisons, target_table, total
 
@@ -48,27 +49,36 @@ def _targets(material: Material) -> list[Entry]:
     return [("bad" if missed else "good", "Targets.", text)]
 
 
-def departures(material: Material, metric: str, place: str) -> list[str] | None:
-    """Return the neighbours in ``Experiment.order`` that do not follow it here, in words; None: not all were run."""
-    order = [name for name in material.experiment.order if math.isfinite(_estimate(material, place, name, metric))]
-    if len(order) < 2 or len(order) < len(material.experiment.order):
+class Swap(NamedTuple):
+    """Two neighbours in ``Experiment.order`` that do not follow it."""
+
+    better: str
+    """The one that should be better."""
+    worse: str
+    gap: PairedDifference
+    """Of the first minus the second, over the maps."""
+
+    @property
+    def is_evidence(self) -> bool:
+        """Say whether the order is really the other way round."""
+        return self.gap.p_value < words.EVIDENCE
+
+
+def departures(material: Material, metric: str, place: str) -> list[Swap] | None:
+    """Return the neighbours in ``Experiment.order`` that do not follow it here; None: not all were run."""
+    order = material.experiment.order
+    if len(order) < 2 or not all(math.isfinite(_estimate(material, place, name, metric)) for name in order):
         return None
     found = []
     for worse, better in pairwise(order):
         first, second = _estimate(material, place, better, metric), _estimate(material, place, worse, metric)
-        if words.better(metric, first, second) or first == second:
-            continue
-        gap = material.paired(place, better, worse, metric)
-        name = f"{better} is behind {worse} by {words.difference(metric, abs(first - second), signed=False)}"
-        paired = f"paired difference {words.difference(metric, gap.estimate)} {words.interval(metric, gap, True)}"
-        says = "which is evidence" if gap.p_value < words.EVIDENCE else "no evidence either way"
-        maps = words.count(gap.used, "map")
-        found.append(f"{name} ({paired}, {words.p_words(gap.p_value)}, {maps}: {says})")
+        if not words.better(metric, first, second) and first != second:
+            found.append(Swap(better, worse, material.paired(place, better, worse, metric)))
     return found
 
 
-def _estimate(material: Material, place: str, planner: str, metric: str) -> float:
-    return material.figure(place, planner, metric).estimate
+def _estimate(material: Material, place: str, name: str, metric: str) -> float:
+    return material.figure(place, name, metric).estimate
 
 
 def _ordered_metrics(material: Material) -> list[str]:
@@ -80,19 +90,33 @@ def _ordered_metrics(material: Material) -> list[str]:
 def _orders(material: Material) -> list[Entry]:
     if len(material.experiment.order) < 2:
         return []
-    held, against, judged = 0, [], 0
-    for metric in _ordered_metrics(material):
-        for place in material.places:
-            found = departures(material, metric, place)
-            judged += found is not None
-            held += found == []
-            against += [f"{words.in_text(metric)}, {place}: {text}" for text in found or []]
+    columns = [(m, place) for m in _ordered_metrics(material) for place in material.places]
+    found = {column: departures(material, *column) for column in columns}
+    judged = {column: swaps for column, swaps in found.items() if swaps is not None}
     if not judged:
         return [("", "Order of the planners.", "Not all planners of the published order were run.")]
+    held = sum(not swaps for swaps in judged.values())
     order = " < ".join(material.experiment.order)
-    text = f"The published order ({order}, worst to best) holds in {held} of {judged} columns of the tables."
-    text += f" It does not in: {'; '.join(against)}." if against else ""
-    return [("good" if held == judged else "bad", "Order of the planners.", text)]
+    text = f"The published order ({order}, worst to best) holds in {held} of {len(judged)} columns of the tables."
+    text += _swapped(judged) if held < len(judged) else ""
+    real = any(swap.is_evidence for swaps in judged.values() for swap in swaps)
+    return [("bad" if real else "good" if held == len(judged) else "", "Order of the planners.", text)]
+
+
+def _swapped(judged: dict[tuple[str, str], list[Swap]]) -> str:
+    """Return which planners stand the other way round where, and what the paired differences say of it."""
+    sentences = []
+    for real in (True, False):
+        where: dict[tuple[str, str], dict[str, list[str]]] = {}
+        for (metric, place), swaps in judged.items():
+            for swap in swaps:
+                if swap.is_evidence is real:
+                    where.setdefault((swap.better, swap.worse), {}).setdefault(metric, []).append(place)
+        for (better, worse), by_metric in where.items():
+            names = [f"{words.in_text(metric)} ({', '.join(places)})" for metric, places in by_metric.items()]
+            says = "which the paired differences confirm" if real else "without evidence in the paired differences"
+            sentences.append(f" {better} is behind {worse} by {words.listed(names)}, {says}.")
+    return "".join(sentences)
 
 
 def order_table(material: Material) -> Table | None:
@@ -103,24 +127,39 @@ def order_table(material: Material) -> Table | None:
         Row([cell(words.title(metric)), *(_order_cell(material, metric, place) for place in material.places)])
         for metric in _ordered_metrics(material)
     ]
-    caption = f"Order of the planners, worst to best; published: {' < '.join(material.experiment.order)}."
+    caption = (
+        f"Order of the planners, worst to best, against {' < '.join(material.experiment.order)}. Where it differs: the "
+        "paired difference of the two planners that stand the other way round."
+    )
     return Table(caption, ["", *material.places], rows, words=True)
 
 
 def _order_cell(material: Material, metric: str, place: str) -> list[Line]:
     order = [name for name in material.experiment.order if math.isfinite(_estimate(material, place, name, metric))]
     reverse = metric_named(metric).better == "lower"
+    swaps = departures(material, metric, place)
     ranked = sorted(order, key=lambda name: _estimate(material, place, name, metric), reverse=reverse)
-    found = departures(material, metric, place)
-    lines = [Line(" < ".join(ranked) or words.MISSING)]
-    if found is None:
-        return [*lines, Line("not all were run", "sub")]
-    lines.append(Line("differs", "sub", "bad") if found else Line("as published", "sub", "good"))
-    theirs = [material.published(metric, place, name) for name in material.experiment.order]
-    values = [v for v in theirs if v is not None]
-    if len(values) == len(theirs) and any(words.better(metric, a, b) for a, b in pairwise(values)):
-        lines.append(Line("the published values of this column have another order themselves", "sub"))
-    return lines
+    if swaps is None:
+        return [Line(" < ".join(ranked) or words.MISSING), Line("not all were run", "sub")]
+    if not swaps:
+        return [Line("holds", "main", "good"), *_printed_order(material, metric, place)]
+    lines = [Line(" < ".join(ranked), "main", "bad" if any(swap.is_evidence for swap in swaps) else "")]
+    for swap in swaps:
+        gap = f"{words.difference(metric, swap.gap.estimate)} {words.interval(metric, swap.gap, True)}"
+        chance = f"{words.p_words(swap.gap.p_value)}, {words.count(swap.gap.used, 'map')}"
+        lines.append(Line(f"{swap.better} − {swap.worse}: {gap}, {chance}", "sub"))
+    return [*lines, *_printed_order(material, metric, place)]
+
+
+def _printed_order(material: Material, metric: str, place: str) -> list[Line]:
+    """Return the order of the published values where it is not ``Experiment.order`` itself."""
+    values = {name: material.published(metric, place, name) for name in material.experiment.order}
+    known = {name: value for name, value in values.items() if value is not None}
+    reverse = metric_named(metric).better == "lower"
+    printed = sorted(known, key=lambda name: known[name], reverse=reverse)
+    if printed == [name for name in material.experiment.order if name in known]:
+        return []
+    return [Line(f"printed values: {' < '.join(printed)}", "sub")]
 
 
 def _evidence(material: Material) -> list[Entry]:
@@ -137,12 +176,16 @@ def _evidence(material: Material) -> list[Entry]:
         chosen = [entry for entry, verdict in verdicts if verdict.words == word]
         if chosen:
             parts.append(f"{word} than {words.listed([_against(metric, entry) for entry in chosen])}")
-    open_ones = [f"{e.other} in {e.place}" for e, verdict in verdicts if verdict.words not in ("better", "worse")]
-    if open_ones:
-        parts.append(f"without evidence of a difference from {words.listed(open_ones)}")
+    undecided: dict[str, list[str]] = {}
+    for entry, verdict in verdicts:
+        if verdict.words not in ("better", "worse"):
+            undecided.setdefault(entry.other, []).append(entry.place)
+    if undecided:
+        names = [f"{other} in {words.listed(places)}" for other, places in undecided.items()]
+        parts.append(f"without evidence of a difference from {'; from '.join(names)}")
     text = f"By {words.in_text(metric)}, map by map, {material.experiment.ours} is {'; '.join(parts)}."
     worse = any(verdict.words == "worse" for _, verdict in verdicts)
-    return [("bad" if worse else "" if open_ones else "good", "Differences.", text)]
+    return [("bad" if worse else "" if undecided else "good", "Differences.", text)]
 
 
 def _against(metric: str, entry: Paired) -> str:

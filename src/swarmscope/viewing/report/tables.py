@@ -6,7 +6,6 @@ import math
 from typing import NamedTuple
 
 from swarmscope.errors import UnknownNameError
-from swarmscope.evaluation.metrics import metric_named
 from swarmscope.evaluation.results import Run
 from swarmscope.evaluation.statistics import PairedDifference
 from swarmscope.evaluation.weight import NEIGHBOUR_PRINTED, SELF_PRINTED, WEIGHT_PRINTED, WeightResult
@@ -39,10 +38,7 @@ def metric_table(material: Material, metric: str) -> Table:
     ]
     sources = material.sources(metric)
     note = f"Published: {words.listed(list(dict.fromkeys(sources)))}." if sources else ""
-    about = metric_named(metric)
-    wanted = {"higher": "; higher is better", "lower": "; lower is better", "neither": ""}[about.better]
-    caption = f"{words.title(metric)}: {about.summary}{wanted}."
-    return Table(caption, ["", *(_place(place) for place in places)], rows, note)
+    return Table(words.about(metric), ["", *(_place(place) for place in places)], rows, note)
 
 
 def _measured(material: Material, place: str, planner: str, metric: str) -> Value:
@@ -50,15 +46,13 @@ def _measured(material: Material, place: str, planner: str, metric: str) -> Valu
     beside = [Line(f"published {words.value(metric, published)}", "sub")] if published is not None else []
     if planner not in material.planners or not material.of(place, planner):
         return [Line(NOT_RUN, "plain"), *beside]
-    lines = [Line(words.value(metric, found.estimate))]
-    bounds = words.interval(metric, found)
-    lines += [Line(bounds, "sub")] if bounds else []
+    lines = cell(words.value(metric, found.estimate), words.interval(metric, found))
     if metric == "path_redundancy":
         every = material.figure(place, planner, "path_redundancy_all").estimate
         lines.append(Line(f"all robots {words.value(metric, every)}", "sub"))
     if published is not None:
         verdict = words.against_published(metric, found, published)
-        lines += [*beside, Line(verdict.words, "sub", verdict.mark)]
+        lines.append(Line(verdict.words, "sub", verdict.mark))
     return lines
 
 
@@ -98,15 +92,13 @@ def comparisons(material: Material, metric: str) -> list[Paired]:
 
 
 def paired_table(material: Material, metric: str) -> Table | None:
-    """Return the table of `comparisons`; None without any."""
+    """Return the table of `comparisons`; None when there is no map to compare on."""
     every = {(entry.place, entry.other): entry for entry in comparisons(material, metric)}
-    if not every:
+    if not any(entry.found.used for entry in every.values()):
         return None
     others = list(dict.fromkeys(other for _, other in every))
     rows = [
-        _row(
-            material, other, [_difference(metric, every.get((place, other))) for place in material.places], "minus "
-        )
+        _row(material, other, [_difference(metric, every.get((place, other))) for place in material.places], "minus ")
         for other in others
     ]
     caption = f"{words.title(metric)}: {material.experiment.ours} minus each other planner, map by map."
@@ -162,9 +154,7 @@ def named_failures(material: Material) -> list[Row]:
 
 def resource_table(material: Material) -> Table:
     """Return what planning and talking cost, over all places; published values (Nav-SCOPE Table II) beside."""
-    names = list(
-        dict.fromkeys(planner for metric in RESOURCES for planner in material.shown_planners(metric))
-    )
+    names = list(dict.fromkeys(planner for metric in RESOURCES for planner in material.shown_planners(metric)))
     rows = [_row(material, name, [_resource(material, name, metric) for metric in RESOURCES]) for name in names]
     note = "Times were measured on the machine that ran the experiment and depend on it; all else is exact."
     sources = list(dict.fromkeys(source for metric in RESOURCES for source in material.sources(metric)))
@@ -178,7 +168,7 @@ def _resource(material: Material, planner: str, metric: str) -> Value:
     beside = f"published {words.value(metric, published)}" if published is not None else ""
     if planner not in material.planners or not material.of(ALL, planner):
         return [Line(NOT_RUN, "plain"), *([Line(beside, "sub")] if beside else [])]
-    return cell(words.value(metric, material.figure(ALL, planner, metric).estimate), beside)
+    return cell(words.value(metric, material.figure(ALL, planner, metric).estimate), "", beside)
 
 
 def weight_table(weight: WeightResult) -> Table:
@@ -218,7 +208,7 @@ def needs_table(material: Material) -> Table:
         keys = material.planner_keys(planner)
         name = str(keys.get("name", ""))
         summary, needs = _about(name)
-        rows.append(_row(material, planner, [cell(name), cell(summary), cell(needs)]))
+        rows.append(_row(material, planner, [[Line(name, "code")], cell(summary), cell(needs)]))
     return Table("What each planner does and is given.", ["", "module", "does", "is given"], rows, words=True)
 
 
@@ -228,7 +218,7 @@ def parameter_table(material: Material) -> Table:
     for planner in material.planners:
         params = dict(material.planner_keys(planner).get("params", {}))
         text = ", ".join(f"{key} = {number:g}" for key, number in params.items()) or "none set"
-        rows.append(_row(material, planner, [cell(text)]))
+        rows.append(_row(material, planner, [[Line(text, "code")]]))
     return Table("Parameters of the planners.", ["", "parameters"], rows, words=True)
 
 
@@ -252,5 +242,3 @@ def _row(material: Material, planner: str, values: list[Value], before: str = ""
 
 def _place(place: str) -> str:
     return "all places" if place == ALL else place
-
-

@@ -39,6 +39,12 @@ TITLES = {
 }
 SHARES = frozenset({"arrival_rate", "collision_rate", "path_redundancy", "path_redundancy_all", "spl"})
 RATIOS = frozenset({"path_stretch", "path_stretch_any_angle"})
+SUMMARIES = {
+    "path_redundancy": "γ = 1 − AR Σl* / Σl, sums over the robots that arrived",
+    "path_redundancy_all": "γ = 1 − AR Σl* / Σl, sums over all robots",
+    "path_stretch": "Σl / Σl*, sums over the robots that arrived",
+    "path_stretch_any_angle": "Σl over the sum of the true shortest ways, robots that arrived",
+}
 STEPS = {"B": ("B", "kB", "MB", "GB"), "us": ("µs", "ms", "s")}
 
 
@@ -52,6 +58,13 @@ class Verdict(NamedTuple):
 def title(metric: str) -> str:
     """Return the name of a figure for headings."""
     return TITLES.get(metric, metric.replace("_", " ").capitalize())
+
+
+def about(metric: str) -> str:
+    """Return what a figure is, and which way is better."""
+    known = metric_named(metric)
+    wanted = {"higher": "; higher is better", "lower": "; lower is better", "neither": ""}[known.better]
+    return f"{title(metric)}: {SUMMARIES.get(metric, known.summary)}{wanted}."
 
 
 def in_text(metric: str) -> str:
@@ -85,26 +98,29 @@ def difference(metric: str, number: float, signed: bool = True) -> str:
 
 
 def interval(metric: str, found: Interval | PairedDifference, differences: bool = False) -> str:
-    """Return the bounds in brackets; empty where there are none."""
+    """Return the bounds in brackets, without their unit if they share it; empty where there are none."""
     if not (math.isfinite(found.low) and math.isfinite(found.high)):
         return ""
-    if differences:
-        return f"[{difference(metric, found.low)}, {difference(metric, found.high)}]"
-    return f"[{value(metric, found.low)}, {value(metric, found.high)}]"
+    shown = difference if differences else value
+    low, high = shown(metric, found.low), shown(metric, found.high)
+    unit = high.rpartition(" ")[2] if " " in high else ""
+    if unit and low.endswith(f" {unit}"):
+        low, high = low.removesuffix(f" {unit}"), high.removesuffix(f" {unit}")
+    return f"[{low}, {high}]"
 
 
 def against_published(metric: str, found: Interval, published: float) -> Verdict:
     """Say how a measured figure compares with a published one."""
     if not math.isfinite(found.estimate):
-        return Verdict("nothing measured", "")
-    apart = found.estimate - published
+        return Verdict(f"published {value(metric, published)}", "")
+    apart, source = found.estimate - published, f"published {value(metric, published)}"
     if _nought(_size(metric, apart)):
-        return Verdict("equal to published", "")
-    words = f"{_size(metric, apart)} {_judged(metric, apart)} than published"
+        return Verdict(f"equal to {source}", "")
+    words = f"{_size(metric, apart)} {_judged(metric, apart)} than {source}"
     if not math.isfinite(found.low):
-        return Verdict(f"{words} (one map)", "")
+        return Verdict(f"{words}, one map", "")
     if found.low <= published <= found.high:
-        return Verdict(f"published value within the interval ({difference(metric, apart)})", "")
+        return Verdict(f"{source} is within the interval", "")
     return Verdict(words, _mark(metric, apart))
 
 
