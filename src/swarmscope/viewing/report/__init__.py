@@ -1,0 +1,39 @@
+"""The report of an experiment: what was measured, beside what was published, as a page and as Markdown."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from swarmscope.evaluation.experiment import Experiment
+from swarmscope.evaluation.results import Run
+from swarmscope.evaluation.weight import WeightResult
+from swarmscope.viewing.report.blocks import pictures_of
+from swarmscope.viewing.report.document import make_document
+from swarmscope.viewing.report.drawing import style
+from swarmscope.viewing.report.markdown import FIGURES, markdown
+from swarmscope.viewing.report.material import Material
+from swarmscope.viewing.report.page import page
+from swarmscope.viewing.report.publish import publish
+
+__all__ = ["write_report"]
+
+
+def write_report(
+    experiment: Experiment,
+    runs: list[Run],
+    out: Path,
+    weight: WeightResult | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> Path:
+    """Write ``report.html`` (holds everything), ``report.md`` and ``figures/`` into ``out``; return the page's path.
+
+    Runs that pictures need are played again. ``progress`` is told what is being made.
+    """
+    with style():
+        document = make_document(Material(experiment, runs, weight), progress or (lambda _: None))
+    contents = {f"{FIGURES}/{picture.name}.png": picture.png for picture in pictures_of(document)}
+    contents["report.md"] = markdown(document).encode("utf-8")
+    contents["report.html"] = page(document).encode("utf-8")
+    publish(out, contents)
+    return out / "report.html"

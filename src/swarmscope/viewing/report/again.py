@@ -1,0 +1,64 @@
+"""Runs played again from their scenarios, for pictures of what happened; the same to the bit as the measured ones."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swarmscope.evaluation.results import Run
+from swarmscope.evaluation.runner import play
+from swarmscope.evaluation.scenario import parse_scenario
+from swarmscope.sim.world import WorldSpec
+
+Floats = NDArray[np.float64]
+
+
+class Played(NamedTuple):
+    """What pictures need of a run; T ticks, N robots, world frame [m]."""
+
+    world: WorldSpec
+    radius: float
+    dt: float
+    x: Floats
+    """(T, N)"""
+    y: Floats
+    yaw: Floats
+    starts: Floats
+    goals: Floats
+    arrived: NDArray[np.bool_]
+    crashed: NDArray[np.bool_]
+
+
+class Again:
+    """Plays runs again, each once."""
+
+    def __init__(self) -> None:
+        self._played: dict[tuple[str, str, int], Played] = {}
+
+    def of(self, run: Run) -> Played:
+        """Return the run's paths; a SwarmscopeError when its scenario no longer runs (a map file that is gone)."""
+        key = (run.place, run.planner, run.seed)
+        if key not in self._played:
+            self._played[key] = _play(run)
+        return self._played[key]
+
+
+def _play(run: Run) -> Played:
+    scenario = parse_scenario(run.config, f"run of seed {run.seed}")
+    scenario = scenario.model_copy(update={"record_scans": "no"})
+    outcome = play(scenario, any_angle=False)
+    records, robots = outcome.trace.records, outcome.trace.robots
+    return Played(
+        world=outcome.setup.world,
+        radius=scenario.robot.radius_m,
+        dt=outcome.setting.dt,
+        x=np.vstack([records.x, robots["x"]]),
+        y=np.vstack([records.y, robots["y"]]),
+        yaw=np.vstack([records.yaw, robots["yaw"]]),
+        starts=outcome.setup.starts,
+        goals=outcome.setup.goals,
+        arrived=np.isfinite(robots["arrival_s"]),
+        crashed=robots["crashed"].astype(bool),
+    )
