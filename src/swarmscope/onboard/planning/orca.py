@@ -39,7 +39,7 @@ from swarmscope.onboard.planning._contract import (
     R_YIELD,
     YIELD,
 )
-from swarmscope.onboard.planning.nav_scope import first_safe, turn_to_safe
+from swarmscope.onboard.planning._following import first_safe, turn_to_safe
 from swarmscope.onboard.tick import begin, finish
 
 NAME = "orca"
