@@ -104,8 +104,8 @@ class Params(NamedTuple):
     """pi/2 - theta_1: with no safe direction this close to the goal's there is a key point."""
     face_deg: float = 10.0
     """theta_0: with less than this to turn, mode A becomes B."""
-    turn_back_deg: float = 120.0
-    """A following looks this far back towards the obstacle from its last direction."""
+    turn_back_deg: float = 105.0
+    """A following looks this far back towards the obstacle from its last direction, or from where the robot faces."""
     arrive_m: float = 0.05
     """Distance to the goal at which a robot has arrived."""
     creep: float = 0.1
@@ -369,7 +369,7 @@ def follow(
     side = memory["side"]
     start = wrap_angle(memory["heading"] - percept["compass"])
     if memory["fresh"] == 0:
-        start -= side * math.radians(params.turn_back_deg)
+        start = side * (max(0.0, side * start) - math.radians(params.turn_back_deg))
     memory["fresh"] = 0
     reason = R_ALONE if decision["fused"] else R_FOLLOW
     heading, found = first_safe(safe, start, side, sensor.angle_min, sensor.increment, sensor.beams, sensor.wraps)
