@@ -7,16 +7,16 @@ from typing import NamedTuple
 import numpy as np
 
 from swarmscope._jit import jit
-from swarmscope.onboard.percept import Rig, Row, Scratch
+from swarmscope.onboard.percept import Rig, Scratch
 from swarmscope.onboard.planning import sfm_mas
 from swarmscope.onboard.planning._memory import MEMORY, new_memory
 
-__all__ = ["MEMORY", "NAME", "NEEDS", "SUMMARY", "Params", "new_memory", "step", "step_all"]
+__all__ = ["MEMORY", "NAME", "NEEDS", "SUMMARY", "Params", "new_memory", "step_all"]
 
 NAME = "sfm-i"
 SUMMARY = "SFM-MAS alone: the same forces and states, every side chosen from the robot's own scan"
 NEEDS = "own scan, goal bearing and distance, relative poses of visible neighbours"
-sfm_mas_step = sfm_mas.step
+sfm_mas_all = sfm_mas.step_all
 WithNeighbours = sfm_mas.Params
 
 
@@ -44,36 +44,6 @@ class Params(NamedTuple):
 
 
 @jit
-def step(
-    ranges: np.ndarray,
-    percept: Row,
-    shared: Row,
-    memory: Row,
-    decision: Row,
-    scratch: Scratch,
-    row: int,
-    rig: Rig,
-    params: Params,
-) -> None:
-    """Run one tick of one robot."""
-    full = WithNeighbours(
-        w_i=0.0,
-        prior=params.prior,
-        patience_s=0.0,
-        arrive_m=params.arrive_m,
-        still_s=params.still_s,
-        wait_s=params.wait_s,
-        wide_turn=params.wide_turn,
-        stuck_s=params.stuck_s,
-        turn_back=params.turn_back,
-        resume_m=params.resume_m,
-        loop_m=params.loop_m,
-    )
-    sfm_mas_step(ranges, percept, shared, memory, decision, scratch, row, rig, full)
-    decision["n_out"] = 0  # answers to others
-
-
-@jit
 def step_all(
     first: int,
     last: int,
@@ -87,5 +57,19 @@ def step_all(
     params: Params,
 ) -> None:
     """Run one tick of robots ``first`` to ``last - 1``."""
+    full = WithNeighbours(
+        w_i=0.0,
+        prior=params.prior,
+        patience_s=0.0,
+        arrive_m=params.arrive_m,
+        still_s=params.still_s,
+        wait_s=params.wait_s,
+        wide_turn=params.wide_turn,
+        stuck_s=params.stuck_s,
+        turn_back=params.turn_back,
+        resume_m=params.resume_m,
+        loop_m=params.loop_m,
+    )
+    sfm_mas_all(first, last, ranges, percepts, shared, memories, decisions, scratch, rig, full)
     for i in range(first, last):
-        step(ranges[i], percepts[i], shared[i], memories[i], decisions[i], scratch, i, rig, params)
+        decisions[i]["n_out"] = 0  # answers to others

@@ -1,0 +1,243 @@
+"""SFM-MAS: its forces by hand, its golden rows, who stops, who asks, who goes first, and whole runs."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from helpers import Rows, circle, circles_world, place_scenario, rig_of, run_scenario, scan_at, wall
+from swarmscope.onboard.perception.areas import normalise, passable_distance
+from swarmscope.onboard.planning import sfm_i, sfm_mas
+from swarmscope.onboard.planning._contract import ADVANCE, DECIDE, FOLLOW, YIELD
+from swarmscope.onboard.planning.fields import (
+    following_probability,
+    fuse,
+    interaction_force,
+    obstacle_constant,
+    obstacle_force,
+    obstacle_potential,
+    propulsion,
+    yields_to,
+)
+from swarmscope.onboard.planning.fusion import own_probability
+from swarmscope.onboard.planning.sfm_mas import goes_first, obstacle_stops
+
+L_TH = 0.6
+HALF = math.radians(30.0)
+TREES = [circle(-1.0, 0.3, 0.35), circle(0.6, -0.8, 0.4), circle(1.2, 0.5, 0.3), circle(-0.4, -1.6, 0.3)]
+STARTS = [(-3.0, -1.5, 0.0), (-3.0, 0.0, 0.0), (-3.0, 1.5, 0.0)]
+GOALS = [(3.0, 1.0), (3.0, 0.0), (3.0, -1.0)]
+LETTER = {"look_ahead": 0.0, "sector": True}
+
+
+def test_the_constant_by_hand():
+    """|F_a| = 0.5, l_th = 0.6 m, alpha = 60 deg: V_0B = 0.36 / 0.8660 x 0.5 = 0.2078; at 1 m F_aB = -0.2078."""
+    assert propulsion(1.0, 0.5) == 0.5
+    assert obstacle_constant(0.5, L_TH, HALF) == pytest.approx(0.207846, abs=1e-6)
+    assert obstacle_force(1.0, 0.207846) == pytest.approx(-0.207846)
+    assert obstacle_force(0.5, 0.207846) == pytest.approx(-0.831384)
+    assert obstacle_potential(0.5, 0.207846) == pytest.approx(-0.415692)
+
+
+@given(st.floats(0.05, 2.0), st.floats(0.1, 3.0), st.floats(0.0, 1.4))
+def test_the_forces_balance_at_the_critical_point(own, reach, half):
+    force = obstacle_force(reach, obstacle_constant(own, reach, half))
+    assert own + force * math.cos(half) == pytest.approx(0.0, abs=1e-12 * own)
+    assert yields_to(own, obstacle_force(0.999 * reach, obstacle_constant(own, reach, half)), math.cos(half))
+    assert not yields_to(own, obstacle_force(1.001 * reach, obstacle_constant(own, reach, half)), math.cos(half))
+
+
+@given(st.floats(0.1, 5.0))
+def test_the_force_is_minus_the_slope_of_the_potential(d):
+    h = 1e-5 * d
+    slope = (obstacle_potential(d + h, 0.3) - obstacle_potential(d - h, 0.3)) / (2.0 * h)
+    assert slope > 0.0
+    assert obstacle_force(d, 0.3) == pytest.approx(-slope, rel=1e-6)
+
+
+TABLE_HALF = math.radians(36.0)
+R3 = [[54, 1.62], [83, 1.53], [128, 1.78], [177, 1.55], [231, 1.89], [282, 1.55], [302, 1.58], [359, 1.18]]
+R4 = [[8, 1.78], [109, 1.17], [176, 1.85], [237, 1.27], [300, 1.69], [329, 1.62]]
+
+
+def test_table_ii_as_this_planner_reads_it():
+    """P_s of R3 by triangles, P_n of R4 with borders on the polygon, and the choice: alone left, together right."""
+    rows = np.array(R3)
+    p_self = own_probability(np.radians(rows[:, 0]), rows[:, 1].copy(), len(rows), TABLE_HALF, 0.0, True)
+    assert p_self == pytest.approx(0.5042, abs=5e-5)
+    rows = np.array(R4)
+    features = np.radians(rows[:, 0]), rows[:, 1].copy(), len(rows)
+    x_1 = passable_distance(*features, 0.0, TABLE_HALF, True)
+    x_2 = passable_distance(*features, -TABLE_HALF, 0.0, True)
+    assert following_probability(x_1, x_2, normalise(2.696, 5.0), False) == pytest.approx(0.4137, abs=5e-4)
+    p, f = np.array([0.395, 0.581, 0.403, 0.414]), np.array([0.236, 0.279, 0.266, 0.247])
+    assert fuse(p_self, float(p @ f), float(f.sum())) == pytest.approx(0.478, abs=5e-4)
+
+
+@pytest.mark.parametrize(
+    ("distance", "degrees", "stops"),
+    [
+        (0.62, 0, True),  # 0.36 / 0.8660 / 0.62^2 = 1.081
+        (0.65, 0, False),  # 0.984
+        (0.62, 20, True),  # 1.081 x 0.9397 = 1.016
+        (0.62, 29, False),  # 1.081 x 0.8746 = 0.946
+        (0.59, 29, True),
+        (0.30, 31, False),  # not in the safety sector
+        (0.30, 180, False),
+    ],
+)
+def test_who_stops_by_the_letter(distance, degrees, stops):
+    rig = rig_of(**LETTER)
+    for sign in (1, -1):
+        ranges = np.full(360, np.inf, np.float32)
+        ranges[180 + sign * degrees if degrees < 180 else 0] = distance
+        assert obstacle_stops(ranges, 0.0, rig) is stops
+        assert obstacle_stops(np.roll(ranges, 90), 0.5 * math.pi, rig) is stops
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "stops"),
+    [
+        (1.95, 0.0, True),
+        (2.1, 0.0, False),
+        (1.9, 0.17, True),
+        (1.9, 0.2, False),
+        (0.3, 0.25, False),
+        (-0.3, 0.0, False),
+    ],
+)
+def test_with_look_ahead_it_stops_for_what_is_in_the_way_of_the_body(x, y, stops):
+    ranges = np.full(360, np.inf, np.float32)
+    bearing = math.atan2(y, x)
+    beam = round(math.degrees(bearing)) + 180
+    ranges[beam % 360] = math.hypot(x, y)
+    turn = math.radians(beam - 180) - bearing  # the return lies on a whole beam
+    assert obstacle_stops(ranges, turn, rig_of()) is stops
+
+
+def test_an_invalid_beam_ahead_stops():
+    ranges = np.full(360, np.inf, np.float32)
+    ranges[200] = np.nan
+    assert obstacle_stops(ranges, 0.0, rig_of())
+    assert not obstacle_stops(ranges, math.pi, rig_of())
+
+
+def rows_before(*trees):
+    rows = Rows(rig_of())
+    rows.percepts["goal_distance"] = 5.0
+    rows.ranges[0] = scan_at(circles_world(trees), rows.rig)
+    return rows, sfm_mas.new_memory(1)
+
+
+def step(rows, memory, planner=sfm_mas):
+    arrays = (rows.ranges, rows.percepts, rows.shared, memory, rows.decisions, rows.scratch)
+    planner.step_all(0, 1, *arrays, rows.rig, planner.Params())
+    rows.percepts["now_s"] += 0.2
+    return rows.decisions[0]
+
+
+def test_it_asks_only_when_it_has_to_decide_and_does_not_wait_for_ever():
+    rows, memory = rows_before((2.6, 0.05, 0.3))  # 2.3 m away: beyond what stops it
+    rows.see((1, 1.2, 0.8, 0.0))
+    decision = step(rows, memory)
+    assert (decision["state"], decision["n_out"]) == (ADVANCE, 0)
+    rows.ranges[0] = scan_at(circles_world([(2.1, 0.05, 0.3)]), rows.rig)
+    decision = step(rows, memory)
+    assert (decision["state"], decision["n_out"], decision["v"]) == (DECIDE, 1, 0.0)
+    states = []
+    for _ in range(5):
+        decision = step(rows, memory)
+        assert decision["n_out"] == 0
+        states.append(int(decision["state"]))
+    assert states[-1] in (FOLLOW, YIELD)
+    assert decision["side"] == -1
+
+
+def test_it_decides_at_once_when_nobody_is_in_the_pass_band():
+    rows, memory = rows_before((2.1, 0.05, 0.3))
+    rows.see((1, 3.2, 0.8, 0.0))
+    decision = step(rows, memory)
+    assert (decision["n_out"], decision["fused"], decision["side"]) == (0, 1, -1)
+
+
+NEAR = interaction_force(0.5, 0.9, 1.0)
+cosine = st.floats(-1.0, 1.0)
+
+
+@given(cosine, cosine)
+def test_of_two_that_would_wait_exactly_one_goes(ours, its):
+    if yields_to(0.5, NEAR, ours) and yields_to(0.5, NEAR, its):
+        assert goes_first(0.5, NEAR, ours, its, True) != goes_first(0.5, NEAR, its, ours, False)
+
+
+def test_who_is_ahead_goes_first():
+    assert goes_first(0.5, NEAR, 1.0, -1.0, False)  # it drives away from us
+    assert goes_first(0.5, NEAR, 1.0, 0.0, False)  # it crosses before us
+    assert goes_first(0.5, NEAR, 1.0, 0.7, False)  # we see it straight ahead, it sees us to its side
+    assert not goes_first(0.5, NEAR, 0.7, 1.0, True)
+    assert goes_first(0.5, NEAR, 1.0, 1.0, True)  # head on: the smaller address
+    assert not goes_first(0.5, NEAR, 1.0, 1.0, False)
+
+
+def meeting(yaw, peer, ticks):
+    """Robot 0 (address 5) sees robot ``peer`` 0.6 m ahead, moving along ``yaw``; return its states."""
+    rows, memory = rows_before()
+    rows.percepts["id"] = 5
+    states = []
+    for k in range(ticks):
+        back = 0.1 * (k % 2)  # it moves, but stays where it is
+        rows.see((peer, 0.6 - back * math.cos(yaw), -back * math.sin(yaw), yaw))
+        states.append(int(step(rows, memory)["state"]))
+    return states
+
+
+def test_it_waits_for_one_that_drives_ahead_and_every_wait_ends():
+    states = meeting(0.0, 9, 14)
+    assert states[0] == YIELD
+    assert ADVANCE in states
+
+
+def test_head_on_the_smaller_address_goes_on():
+    assert meeting(math.pi, 2, 1) == [YIELD]
+    assert meeting(math.pi, 9, 1) == [ADVANCE]
+
+
+def trace_of(name, starts=STARTS, goals=GOALS, obstacles=TREES, **more):
+    planner = {"name": name, "params": more.pop("params", {})}
+    trace = run_scenario(place_scenario(starts, goals, obstacles, planner=planner, **more))
+    assert trace.robots["arrived"].all()
+    assert not trace.robots["crashed"].any()
+    return trace
+
+
+def test_sfm_i_runs_like_sfm_mas_without_weight_bit_for_bit():
+    alone, weightless = trace_of("sfm-i"), trace_of("sfm-mas", params={"w_i": 0.0})
+    assert (alone.records.side != 0).any()
+    assert alone.robots.tobytes() == weightless.robots.tobytes()
+    for one, other in zip(alone.records, weightless.records, strict=True):
+        assert one.tobytes() == other.tobytes()
+    assert alone.robots["bytes"].sum() == 0
+    assert trace_of("sfm-mas").robots["bytes"].sum() > 0
+    ours, full = sfm_i.Params._field_defaults, sfm_mas.Params._field_defaults
+    assert set(full) - set(ours) == {"w_i", "patience_s"}
+    assert all(full[name] == value for name, value in ours.items())
+
+
+@pytest.mark.parametrize("name", ["sfm-mas", "sfm-i"])
+def test_out_of_a_dead_end_through_a_door_and_past_each_other(name):
+    trap = wall((-2.5, -0.8), (0, -0.8), (0, 0.8), (-2.5, 0.8))
+    trace_of(name, [(-1.5, 0.1, 0.0)], [(3.0, 0.0)], [trap])
+    door = [wall((0, 0.4), (0, 4)), wall((0, -0.4), (0, -4)), wall((-4, 4), (4, 4), (4, -4), (-4, -4), (-4, 4))]
+    trace_of(name, [(-2, 0.2, 0), (2, -0.2, math.pi)], [(2, 0.2), (-2, -0.2)], door)
+    starts = [(-3, 0, 0), (3, 0, math.pi), (0, -3, 1.57), (0, 3, -1.57)]
+    trace = trace_of(name, starts, [(3, 0), (-3, 0), (0, 3), (0, -3)], [])
+    assert (trace.robots["length"] <= 1.5 * 6.0).all()
+
+
+def test_the_letter_runs_too():
+    letter = {"look_ahead_m": 0.0, "sector": True}
+    trace_of("sfm-mas", safety=letter, params={"prior": 0.0})
