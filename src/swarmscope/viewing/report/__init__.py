@@ -11,10 +11,10 @@ from swarmscope.evaluation.weight import WeightResult
 from swarmscope.viewing.report.blocks import pictures_of
 from swarmscope.viewing.report.document import make_document
 from swarmscope.viewing.report.drawing import style
-from swarmscope.viewing.report.markdown import FIGURES, markdown
+from swarmscope.viewing.report.markdown import FIGURES, markdown_text
 from swarmscope.viewing.report.material import Material
-from swarmscope.viewing.report.page import page
-from swarmscope.viewing.report.publish import publish
+from swarmscope.viewing.report.page import page_text
+from swarmscope.viewing.report.publish import put_in_place
 
 __all__ = ["write_report"]
 
@@ -33,7 +33,7 @@ def write_report(
     with style():
         document = make_document(Material(experiment, runs, weight), progress or (lambda _: None))
     contents = {f"{FIGURES}/{picture.name}.png": picture.png for picture in pictures_of(document)}
-    contents["report.md"] = markdown(document).encode("utf-8")
-    contents["report.html"] = page(document).encode("utf-8")
-    publish(out, contents)
+    contents["report.md"] = markdown_text(document).encode("utf-8")
+    contents["report.html"] = page_text(document).encode("utf-8")
+    put_in_place(out, contents)
     return out / "report.html"

@@ -72,10 +72,10 @@ def case_picture(run: Run, case: Case, again: Again) -> Picture:
     side, other = ("left", "right") if case["side"] > 0 else ("right", "left")
     caption = (
         f"{case['kind'].capitalize()}: {run.place}, seed {run.seed}, robot {case['robot']} at {case['t_s']:.1f} s. "
-        f"Alone it would have gone {other} (P_a = {case['p_self']:.3f}, dashed arrow); with its neighbours it went {side} "
-        f"(P_dir = {case['p_left']:.3f}, arrow): {KINDS[case['kind']]}. Grey arrow: direction of the goal. Green: "
-        f"neighbours that took part, the wider the link the larger f_ai; grey discs: other robots; dotted rings: pass "
-        f"band. Line: its path in the {AFTER_S:g} s after, dotted before."
+        f"Alone it would have gone {other} (P_a = {case['p_self']:.3f}, dashed arrow); with its neighbours it "
+        f"went {side} (P_dir = {case['p_left']:.3f}, arrow): {KINDS[case['kind']]}. Grey arrow: direction of the goal. "
+        f"Green: neighbours that took part, the wider the link the larger f_ai; grey discs: other robots; dotted "
+        f"rings: pass band. Line: its path in the {AFTER_S:g} s after, dotted before."
     )
     return picture(figure, f"case_{case['kind']}", caption, f"A case of {case['kind']}", case_table(case))
 

@@ -73,7 +73,7 @@ def _about(material: Material) -> str:
     text += (
         f"{words.listed(ran)} in {words.listed(material.places)}: {words.count(len(main), 'run')} over the worlds of "
         f"seeds {words.spans(run.seed for run in main)}, {words.count(robots, 'journey')} of single robots. "
-        + (f"{words.grouped(lost)} of them did not end at the goal; " if lost else "All of them ended at the goal; ")
+        + (f"{words.grouped(lost)} of them did not arrive; " if lost else "All arrived; ")
         + (f"{words.count(hit, 'robot')} touched something." if hit else "no robot touched anything.")
     )
     absent = [p for p in material.planners if p not in ran]

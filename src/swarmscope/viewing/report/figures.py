@@ -59,7 +59,7 @@ def _boxes(material: Material, metric: str) -> Picture:
         f"{words.title(metric)} of each planner in each place, one dot per map ({_maps(material, metric)}). Boxes: "
         "quartiles and median, whiskers: the farthest map within 1.5 times the box."
     )
-    caption += " Dark bars: published values." if material.published_places(metric) else ""
+    caption += " Bars across: published values." if material.published_places(metric) else ""
     return picture(figure, f"boxes_{metric}", caption, f"Box plots of {words.title(metric)}")
 
 

@@ -28,7 +28,7 @@ MARKS = {"good": "✓ ", "bad": "✗ ", "": ""}
 Numbers = dict[int, str]
 
 
-def markdown(document: Document) -> str:
+def markdown_text(document: Document) -> str:
     """Return the Markdown text."""
     named = numbers(document)
     parts = [f"# {_plain(document.title)}", _plain(document.about), _block(document.facts, named)]

@@ -36,7 +36,7 @@ WIDE_PX = 560
 """A wider figure is scrolled on a narrow page, not shrunk until its type cannot be read."""
 
 
-def page(document: Document) -> str:
+def page_text(document: Document) -> str:
     """Return the HTML text."""
     named = numbers(document)
     template = (files("swarmscope.viewing.report") / "page.html").read_text(encoding="utf-8")

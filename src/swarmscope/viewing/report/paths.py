@@ -50,7 +50,7 @@ def path_picture(material: Material, again: Again, progress: Callable[[str], Non
     panels = figure.subplots(len(places), len(planners), squeeze=False)
     for k, (row, place) in enumerate(zip(panels, places, strict=True)):
         for axes, planner in zip(row, planners, strict=True):
-            _panel(axes, played.get((place, planner)), material.colour(planner))
+            _panel(axes, played.get((place, planner)), material.colour(planner), 0.75 if len(planners) > 3 else 1.0)
             if (place, planner) in runs:
                 axes.set_title(_figures(runs[place, planner]), fontsize=7.5, color=FAINT, loc="right", pad=3)
             if axes is row[0]:
@@ -74,7 +74,7 @@ def _size(played: dict[tuple[str, str], Played], places: list[str], planners: li
     return 0.5 + width * len(planners), 0.35 + (width * shape + 0.25) * len(places)
 
 
-def _panel(axes: Axes, played: Played | None, colour: str) -> None:
+def _panel(axes: Axes, played: Played | None, colour: str, thin: float) -> None:
     axes.set_xticks([])
     axes.set_yticks([])
     for spine in axes.spines.values():
@@ -84,11 +84,13 @@ def _panel(axes: Axes, played: Played | None, colour: str) -> None:
         return
     frame(axes, played)
     _draw_obstacles(axes, played.world.obstacles)
-    thin = 0.5 if played.x.shape[1] > MANY else 1.0
+    thin *= 0.5 if played.x.shape[1] > MANY else 1.0
     for i in range(played.x.shape[1]):
         good = bool(played.arrived[i])
         tint = colour if good else CRASH
-        axes.plot(played.x[:, i], played.y[:, i], color=tint, lw=thin if good else 1.4 * thin, alpha=0.9, zorder=3)
+        axes.plot(
+            played.x[:, i], played.y[:, i], color=tint, lw=thin if good else 1.4 * thin, zorder=3 if good else 3.5
+        )
         axes.plot(*played.starts[i, :2], "o", ms=2.6 * thin, color=tint, zorder=4)
         axes.plot(*played.goals[i], "o", ms=4.0 * thin, mfc=PAPER, mec=tint, mew=0.8, zorder=4)
         if not good:

@@ -14,7 +14,7 @@ from swarmscope.errors import SwarmscopeError
 PARTIAL = re.compile(r"\.report\.partial-(\d+)")
 
 
-def publish(out: Path, contents: dict[str, bytes]) -> None:
+def put_in_place(out: Path, contents: dict[str, bytes]) -> None:
     """Write ``contents`` (path below ``out`` -> bytes); nothing is replaced before everything is on the disk.
 
     The last entry is renamed last. Raises SwarmscopeError with the place when it cannot be written.

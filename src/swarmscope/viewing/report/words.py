@@ -45,6 +45,7 @@ SUMMARIES = {
     "path_stretch": "Σl / Σl*, sums over the robots that arrived",
     "path_stretch_any_angle": "Σl over the sum of the true shortest ways, robots that arrived",
 }
+DECIMAL = frozenset({"s", "kbps"})
 STEPS = {"B": ("B", "kB", "MB", "GB"), "us": ("µs", "ms", "s")}
 
 
@@ -85,6 +86,8 @@ def value(metric: str, number: float | None) -> str:
     if unit in STEPS:
         scaled, unit = _scaled(number, STEPS[unit])
         return f"{_digits(scaled)} {unit}"
+    if unit in DECIMAL:
+        return f"{_fixed(number, 1)} {unit}"
     return f"{_digits(number)} {unit}".strip()
 
 
@@ -243,9 +246,9 @@ def _scaled(number: float, units: Sequence[str]) -> tuple[float, str]:
 
 
 def _digits(number: float) -> str:
-    """Return about three significant digits, all of those before the point."""
+    """Return three or four significant digits, all of those before the point."""
     size = abs(number)
-    return _fixed(number, 0 if size >= 99.95 or number == int(number) else 1 if size >= 0.95 else 3)
+    return _fixed(number, 0 if size >= 999.5 or number == int(number) else 1 if size >= 0.95 else 3)
 
 
 def _fixed(number: float, digits: int) -> str:
