@@ -18,10 +18,13 @@ BLOCKED = (
     "rich",
     "yaml",
     "PIL",
+    "navground",
     "swarmscope.sim",
     "swarmscope.tasks",
 )
 ONBOARD = sorted(SRC.glob("onboard/**/*.py"))
+LIBRARIES = {"orca.py": "navground"}
+"""A baseline that a library plans; the library is loaded when the planner is used."""
 SOURCES = sorted(SRC.glob("**/*.py"))
 
 
@@ -65,7 +68,7 @@ def test_on_board_modules_import_only_what_a_robot_has(path):
     allowed = ("numpy", "swarmscope.onboard", "swarmscope._jit", "swarmscope.geometry", "swarmscope.errors")
     for name in imports_of(path):
         root = name.split(".")[0]
-        assert name.startswith(allowed) or root in sys.stdlib_module_names, name
+        assert name.startswith(allowed) or root in sys.stdlib_module_names or root == LIBRARIES.get(path.name), name
 
 
 @pytest.mark.parametrize("path", [p for p in SOURCES if p.name != "_jit.py"], ids=module_of)

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import math
 import threading
-from importlib import import_module
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -150,11 +149,11 @@ def _library() -> Any:
     found = getattr(_local, "library", None)
     if found is None:
         try:
-            core = import_module("navground.core")
-            behaviors = import_module("navground.core.behaviors")
+            from navground.core import LineSegment, Neighbor
+            from navground.core.behaviors import ORCABehavior
         except ImportError:
             raise MissingExtraError(f"planner '{NAME}'", "orca") from None
-        found = _local.library = (core.LineSegment, core.Neighbor, behaviors.ORCABehavior())
+        found = _local.library = (LineSegment, Neighbor, ORCABehavior())
     return found
 
 
