@@ -33,6 +33,8 @@ def test_unknown_names_are_errors_with_the_nearest() -> None:
         load_task("T1").make(0, densty=0.3)
     with pytest.raises(ConfigError, match="density"):
         load_task("T1").make(0, density=math.nan)
+    with pytest.raises(ConfigError, match="density: must be a number"):
+        load_task("T1").make(0, density="dense")
 
 
 @pytest.mark.parametrize("name", TASKS)

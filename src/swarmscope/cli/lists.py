@@ -12,6 +12,7 @@ from swarmscope.cli._console import PlainConsole
 from swarmscope.evaluation.scenario import task_options
 from swarmscope.onboard.planning._contract import load_planner, planner_names
 from swarmscope.tasks import load_task, task_names
+from swarmscope.tasks._contract import Option
 
 
 def list_planners() -> None:
@@ -32,10 +33,14 @@ def list_tasks() -> None:
     table = Table("task", "what it is", "task.options and defaults")
     for name in task_names():
         task = load_task(name)
-        options = " ".join(f"{key}={value:g}" for key, value in task_options(task).items())
+        options = " ".join(f"{key}={_short(value)}" for key, value in task_options(task).items())
         table.add_row(name, task.SUMMARY, options)
     PlainConsole().print(table)
     print("Example of an option: swarmscope run --task T1 --set task.options.density=0.2")
+
+
+def _short(value: Option) -> str:
+    return value if isinstance(value, str) else f"{value:g}"
 
 
 def field_docs(module: ModuleType, class_name: str) -> dict[str, str]:

@@ -20,7 +20,7 @@ from swarmscope.sim.loop import Setting
 from swarmscope.sim.maps import load_map, packaged_map
 from swarmscope.sim.state import Noise, Radio
 from swarmscope.sim.world import WorldSpec, compile_world
-from swarmscope.tasks._contract import Setup, load_task, task_names
+from swarmscope.tasks._contract import Option, Setup, load_task, task_names
 
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
@@ -97,7 +97,7 @@ class TaskModel(_Strict):
     """A task by name, with its options."""
 
     name: str
-    options: dict[str, float] = {}
+    options: dict[str, float | str] = {}
 
 
 class MapModel(_Strict):
@@ -250,10 +250,11 @@ def complete(scenario: Scenario) -> dict[str, Any]:
     return values
 
 
-def task_options(task: Any) -> dict[str, float]:
+def task_options(task: Any) -> dict[str, Option]:
     """Return the options of a task module with their defaults: the fields of its ``...Options`` dataclass."""
     kinds: list[Any] = [k for name, k in vars(task).items() if name.endswith("Options") and is_dataclass(k)]
-    return {name: float(value) for kind in kinds for name, value in asdict(kind()).items()}
+    values = [item for kind in kinds for item in asdict(kind()).items()]
+    return {name: value if isinstance(value, str) else float(value) for name, value in values}
 
 
 def map_path(name: str) -> Path:

@@ -8,16 +8,21 @@ asked for.
 from __future__ import annotations
 
 import importlib
+import math
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, Protocol, TypeVar, cast
+from typing import Any, Protocol, TypeVar, cast, get_args, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swarmscope.errors import ConfigError, UnknownNameError
 from swarmscope.sim.world import WorldSpec
+
+Option = float | str
+"""What an option can be: a number, or one of a few words."""
 
 Options = TypeVar("Options")
 
@@ -37,7 +42,7 @@ class Task(Protocol):
     NAME: str
     SUMMARY: str
 
-    def make(self, seed: int, robots: int = ..., radius: float = ..., **options: float) -> Setup:
+    def make(self, seed: int, robots: int = ..., radius: float = ..., **options: Option) -> Setup:
         """Return a solvable setup for ``robots`` robots of ``radius`` [m]; the same seed gives the same
         setup."""
         ...
@@ -57,22 +62,36 @@ def task_names() -> list[str]:
 
 
 def read_options(kind: type[Options], options: Mapping[str, Any], task: str) -> Options:
-    """Return the dataclass ``kind`` filled with ``options``; every field of it is a positive number."""
+    """Return the dataclass ``kind`` filled with ``options``.
+
+    Every field of it is a number >= 0, or, where it is declared as a ``Literal`` of words, one of these.
+    """
+    hints, where = get_type_hints(kind), f"task {task}"
     valid = [field.name for field in fields(cast("Any", kind))]
-    values: dict[str, float] = {}
+    values: dict[str, Option] = {}
     for name, value in options.items():
-        where = f"task {task}"
         if name not in valid:
             raise UnknownNameError("option", name, valid, where)
-        if (
-            isinstance(value, bool)
-            or not isinstance(value, int | float)
-            or not np.isfinite(value)
-            or value < 0.0
-        ):
-            raise ConfigError(f"{where}: {name}", f"must be a number >= 0, not {value!r}")
-        values[name] = float(value)
+        words = [word for word in get_args(hints[name]) if isinstance(word, str)]
+        values[name] = _word(name, value, words, where) if words else _number(name, value, where)
     return kind(**values)
+
+
+def _word(name: str, value: Any, words: list[str], where: str) -> str:
+    if value not in words:
+        raise UnknownNameError(name, str(value), words, where)
+    return str(value)
+
+
+def _number(name: str, value: Any, where: str) -> float:
+    """Return a number >= 0; text that reads as a number is one (YAML 1.1 takes 1e-3 for text)."""
+    number = math.nan
+    if isinstance(value, int | float | str) and not isinstance(value, bool):
+        with suppress(ValueError):
+            number = float(value)
+    if not (math.isfinite(number) and number >= 0.0):
+        raise ConfigError(f"{where}: {name}", f"must be a number >= 0, not {value!r}")
+    return number
 
 
 def check_robots(robots: int, radius: float) -> None:

@@ -1,8 +1,13 @@
-"""Forests of trees, and the lines and rings of robots in front of them.
+"""Forests of trees or fields of rocks, and the lines and rings of robots in front of them.
 
 *Trees* are circles with radii uniform in [radius_min, radius_max], placed uniformly at random (rejection)
 inside a square or a disc; they do not overlap, and keep ``MARGIN_M`` between their surface and every start
 and goal.
+
+*Rocks* (option ``obstacles: rocks``) are convex polygons of 5 to 8 corners in place of the trees: the radii are
+drawn as those of trees, and a rock has the area of the tree of its radius, so areas are spread alike
+(`_rocks`). Placing and margins go by the rock's bounding circle, so that rocks keep at least the margins of
+trees.
 
 *More robots than fit.* With ``robots`` up to what one line (or ring) holds at the smallest spacing 2 radius
 + 0.4 m, the forest has the size asked for and the robots are evenly spaced. Beyond that, the forest grows so
@@ -14,16 +19,19 @@ of T1 have a forest of 447 m x 447 m.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swarmscope._jit import jit_alloc as jit
 from swarmscope.errors import ConfigError, UnsolvableWorldError
-from swarmscope.sim.world import Circle, WorldSpec
+from swarmscope.sim.world import Circle, Obstacle, Polygon, WorldSpec
 from swarmscope.tasks._check import Reach, unreachable
 from swarmscope.tasks._contract import Setup
+from swarmscope.tasks._rocks import Rocks, draw_rocks
 
 MARGIN_M = 0.60  # between a tree's surface and the centre of a start or goal, at least
 ROOM_M = 0.30  # the same beyond a robot's radius, for robots wider than 0.30 m
@@ -32,7 +40,7 @@ LINE_OFFSET_M = 0.5  # from the square's side to the first rank of starts
 RING_OFFSET_M = 0.7  # from the disc's rim to the first ring of starts
 REDRAWS = 20  # how often an unsolvable forest is drawn anew
 TRIES_PER_TREE = 400
-TREES, GOALS = 1, 2  # purposes: each has its own random stream
+TREES, GOALS, ROCKS = 1, 2, 3  # purposes: each has its own random stream
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -46,6 +54,7 @@ class ForestOptions:
     density: float = 0.35  # trees per m^2
     radius_min: float = 0.15  # [m]
     radius_max: float = 0.35  # [m]
+    obstacles: Literal["trees", "rocks"] = "trees"
 
 
 @dataclass(frozen=True)
@@ -125,10 +134,17 @@ def plant(seed: int, places: Places, radius: float, options: ForestOptions) -> S
     why = ""
     for draw in range(REDRAWS + 1):
         rng = np.random.default_rng([seed, TREES, draw])
-        circles = [
-            Circle(center=(x, y), radius=r) for x, y, r in _trees(rng, places, options, margin).tolist()
-        ]
-        setup = Setup(WorldSpec(obstacles=circles, bounds=_bounds(places)), places.starts, places.goals)
+        radii = _radii(rng, places, options)
+        obstacles: list[Obstacle]
+        if options.obstacles == "trees":
+            trees = _planted(rng, places, options, radii, margin)
+            obstacles = [Circle(center=(x, y), radius=r) for x, y, r in trees.tolist()]
+        else:
+            rocks = draw_rocks(np.random.default_rng([seed, ROCKS, draw]), math.pi * radii**2)
+            obstacles = list(_rocks(rocks, _planted(rng, places, options, rocks.reach, margin)))
+        # made of numbers that are known to be valid: 70 000 rocks need not be looked at twice
+        world = WorldSpec.model_construct(obstacles=obstacles, bounds=_bounds(places))
+        setup = Setup(world, places.starts, places.goals)
         bad = unreachable(setup, reach)
         if bad.size == 0:
             return setup
@@ -154,16 +170,23 @@ def _ring_holds(disc: float, ring: int, step: float) -> int:
     return max(1, math.floor(2.0 * math.pi * (disc + RING_OFFSET_M + ring * step) / step))
 
 
-def _trees(rng: np.random.Generator, places: Places, options: ForestOptions, margin: float) -> Floats:
-    """Return the trees (C, 3) x, y, radius [m]."""
+def _radii(rng: np.random.Generator, places: Places, options: ForestOptions) -> Floats:
+    """Return the radii (C,) [m] of the trees, or of trees as large as the rocks."""
     if not 0.0 < options.radius_min <= options.radius_max:
         raise ConfigError("radius_min, radius_max", "need 0 < radius_min <= radius_max")
     if 2.0 * options.radius_max >= places.extent:
         raise ConfigError("radius_max", f"is too large for a forest of {places.extent:.2f} m")
     count = round(options.density * places.area)
-    radii = rng.uniform(options.radius_min, options.radius_max, count)
+    return rng.uniform(options.radius_min, options.radius_max, count)
+
+
+def _planted(
+    rng: np.random.Generator, places: Places, options: ForestOptions, radii: Floats, margin: float
+) -> Floats:
+    """Return discs (C, 3) x, y, radius [m] of these radii at free places."""
+    count = len(radii)
     points = np.vstack([places.starts[:, :2], places.goals])
-    cell = 2.0 * max(margin, options.radius_max)
+    cell = 2.0 * max(margin, options.radius_max, float(radii.max(initial=0.0)))
     placer = _Placer(places, points, margin, cell)
     trees = np.zeros((count, 3))
     trees[:, 2] = radii
@@ -172,12 +195,21 @@ def _trees(rng: np.random.Generator, places: Places, options: ForestOptions, mar
         if tries >= TRIES_PER_TREE * count:
             raise ConfigError(
                 "density",
-                f"{count} trees do not fit into {places.area:.0f} m^2 ({planted} of them were placed)",
+                f"{count} {options.obstacles} do not fit into {places.area:.0f} m^2 ({planted} of them were placed)",
             )
         unit = rng.random((4 * count, 2))
         tries += len(unit)
         planted = placer.place(trees, planted, placer.spread(unit))
     return trees
+
+
+def _rocks(rocks: Rocks, places: Floats) -> Iterator[Polygon]:
+    """Put rocks at places (C, 3) x, y, bounding radius."""
+    first = 0
+    for count, (x, y, _) in zip(rocks.counts.tolist(), places.tolist(), strict=True):
+        corners = rocks.corners[first : first + count] + np.array([x, y])
+        yield Polygon.model_construct(points=[(px, py) for px, py in corners.tolist()])
+        first += count
 
 
 class _Placer:

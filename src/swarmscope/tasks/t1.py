@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from swarmscope.tasks._contract import Setup, check_robots, read_options
+from swarmscope.tasks._contract import Option, Setup, check_robots, read_options
 from swarmscope.tasks._forest import ForestOptions, lines, plant
 
 NAME = "T1"
 SUMMARY = "cross a square forest from left to right, goals in the order of the starts"
 
 
-def make(seed: int, robots: int = 15, radius: float = 0.15, **options: float) -> Setup:
+def make(seed: int, robots: int = 15, radius: float = 0.15, **options: Option) -> Setup:
     """Return a solvable forest and two lines; options are the fields of `ForestOptions`."""
     check_robots(robots, radius)
     chosen = read_options(ForestOptions, options, NAME)

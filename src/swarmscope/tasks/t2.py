@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from swarmscope.tasks._contract import Setup, check_robots, read_options
+from swarmscope.tasks._contract import Option, Setup, check_robots, read_options
 from swarmscope.tasks._forest import GOALS, ForestOptions, lines, plant, yaw_toward
 
 NAME = "T2"
 SUMMARY = "cross a square forest from left to right, goals permuted at random"
 
 
-def make(seed: int, robots: int = 15, radius: float = 0.15, **options: float) -> Setup:
+def make(seed: int, robots: int = 15, radius: float = 0.15, **options: Option) -> Setup:
     """Return a solvable forest and two lines; options are the fields of `ForestOptions`."""
     check_robots(robots, radius)
     chosen = read_options(ForestOptions, options, NAME)
