@@ -10,11 +10,11 @@ from swarmscope.errors import SwarmscopeError
 from swarmscope.evaluation.results import Run
 from swarmscope.evaluation.scenario import parse_scenario
 from swarmscope.onboard.robot import Body, protection_model
-from swarmscope.viewing.pictures import FAINT, INK, _draw_obstacles
+from swarmscope.viewing.pictures import FAINT, INK
 from swarmscope.viewing.report import words
 from swarmscope.viewing.report.again import Again, Played
 from swarmscope.viewing.report.blocks import Block, Line, Picture, Row, Table, Text, cell
-from swarmscope.viewing.report.drawing import FRAME, PAPER, new_figure, picture, symbols
+from swarmscope.viewing.report.drawing import FRAME, PAPER, draw_world, new_figure, picture, symbols
 from swarmscope.viewing.report.material import ALL, OURS_COLOUR, Material
 
 if TYPE_CHECKING:
@@ -120,7 +120,7 @@ def _draw_place(axes: Axes, run: Run, case: Case, played: Played) -> None:
     axes.set_xlim(cx - 1.15 * reach, cx + 1.15 * reach)
     axes.set_ylim(cy - 1.15 * reach, cy + 1.15 * reach)
     axes.set_aspect("equal")
-    _draw_obstacles(axes, played.world.obstacles)
+    draw_world(axes, played.world.obstacles)
     for ring in (sigma, 3.0 * sigma):
         axes.add_patch(patches.Circle((x, y), ring, fill=False, ec=FAINT, lw=0.8, ls=(0, (1, 3)), zorder=2))
     _draw_path(axes, played, me, tick)

@@ -9,7 +9,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from swarmscope.viewing.pictures import CRASH, FAINT, GROUND, INK, SOLID, SOLID_EDGE
+from swarmscope.sim.world import Obstacle
+from swarmscope.viewing.pictures import CRASH, FAINT, GROUND, INK, SOLID, SOLID_EDGE, _draw_obstacles
 from swarmscope.viewing.report.blocks import Picture, Table
 
 if TYPE_CHECKING:
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 
 PAPER, GRID, FRAME, WALL = "#fffffe", "#e6e8ea", "#c4c9cd", "#8c9a86"
 PX_PER_INCH = 96
+MANY_SHAPES = 1000
 SYMBOL = r"(?<![\w.])([NPfwtσ])_(ni|ai|dir|plan|a|u|i)(?!\w)"
 """Symbols with an index."""
 GREEK = {"σ": r"\sigma"}
@@ -88,7 +90,7 @@ def picture(figure: Figure, name: str, caption: str, alt: str, beside: Table | N
     """Return the finished figure in both forms; the same figure gives the same bytes."""
     svg, png = io.StringIO(), io.BytesIO()
     none = dict.fromkeys(("Date", "Creator", "Format", "Type"))
-    figure.savefig(svg, format="svg", transparent=True, metadata=none)
+    figure.savefig(svg, format="svg", dpi=2 * PX_PER_INCH, transparent=True, metadata=none)
     figure.savefig(png, format="png", dpi=2 * PX_PER_INCH, facecolor="white", metadata={"Software": None})
     width = round(figure.get_figwidth() * PX_PER_INCH)
     return Picture(name, caption, alt, _themed(svg.getvalue()), png.getvalue(), width, beside)
@@ -97,6 +99,14 @@ def picture(figure: Figure, name: str, caption: str, alt: str, beside: Table | N
 def data_uri(svg: str) -> str:
     """Return the drawing as an address that holds all of it."""
     return "data:image/svg+xml;base64," + base64.b64encode(svg.encode()).decode("ascii")
+
+
+def draw_world(axes: Axes, obstacles: list[Obstacle]) -> None:
+    """Draw obstacles; the many rectangles of an occupancy grid become one image within the drawing."""
+    _draw_obstacles(axes, obstacles)
+    for collection in axes.collections:
+        if len(collection.get_paths()) > MANY_SHAPES:
+            collection.set_rasterized(True)
 
 
 def note_grid(axes: Axes) -> None:
@@ -119,6 +129,6 @@ def _themed(svg: str) -> str:
         svg = re.sub(re.escape(light), f"var(--{name})", svg, flags=re.I)
     plain = "".join(f"--{name}:{light};" for light, name in names.items())
     dark = "".join(f"--{name}:{DARK[light]};" for light, name in names.items())
-    rules = f"svg{{{plain}}}@media screen and (prefers-color-scheme:dark){{svg{{{dark}}}}}"
+    rules = f"svg{{{plain}}}@media screen and (prefers-color-scheme:dark){{svg{{{dark}}}image{{opacity:.3}}}}"
     start = svg.index(">", svg.index("<svg")) + 1
     return f"{svg[:start]}<style>{rules}</style>{svg[start:]}"

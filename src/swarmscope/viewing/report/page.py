@@ -151,5 +151,5 @@ def _picture(block: Picture, named: Numbers) -> str:
 
 def _words(text: str) -> str:
     """Return escaped text with symbols such as w_i set with an index."""
-    text = re.sub(SYMBOL, r"<i>\1</i><sub>\2</sub>", escape(text))
+    text = re.sub(SYMBOL, r"<i>\1</i><sub>\2</sub>", escape(text)).replace(" %", "&nbsp;%")
     return re.sub(NAME, r'<span class="whole">\g<0></span>', text)

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from swarmscope.evaluation.results import Run
-from swarmscope.viewing.pictures import CRASH, FAINT, _draw_obstacles
+from swarmscope.viewing.pictures import CRASH, FAINT
 from swarmscope.viewing.report import words
 from swarmscope.viewing.report.again import Again, Played
 from swarmscope.viewing.report.blocks import Picture
-from swarmscope.viewing.report.drawing import FRAME, PAPER, new_figure, picture
+from swarmscope.viewing.report.drawing import FRAME, PAPER, draw_world, new_figure, picture
 from swarmscope.viewing.report.material import ALL, Material
 
 if TYPE_CHECKING:
@@ -46,8 +46,10 @@ def path_picture(material: Material, again: Again, progress: Callable[[str], Non
         return None
     progress(f"paths of seed {seed}")
     played = {key: again.of(run) for key, run in runs.items()}
-    figure = new_figure(*_size(played, places, planners))
-    panels = figure.subplots(len(places), len(planners), squeeze=False)
+    shapes = [_shape(next(p for (name, _), p in played.items() if name == place)) for place in places]
+    width = max(1.6, min(3.4, 10.6 / len(planners)))
+    figure = new_figure(0.5 + width * len(planners), 0.35 + sum(width * shape + 0.25 for shape in shapes))
+    panels = figure.subplots(len(places), len(planners), squeeze=False, height_ratios=shapes)
     for k, (row, place) in enumerate(zip(panels, places, strict=True)):
         for axes, planner in zip(row, planners, strict=True):
             _panel(axes, played.get((place, planner)), material.colour(planner), 0.75 if len(planners) > 3 else 1.0)
@@ -67,11 +69,10 @@ def path_picture(material: Material, again: Again, progress: Callable[[str], Non
     return picture(figure, "paths", caption, "Paths of all robots for each planner and place")
 
 
-def _size(played: dict[tuple[str, str], Played], places: list[str], planners: list[str]) -> tuple[float, float]:
-    x0, y0, x1, y1 = next(iter(played.values())).world.bounds
-    width = max(1.6, min(3.4, 10.6 / len(planners)))
-    shape = min(2.5, max(0.4, (y1 - y0) / (x1 - x0)))
-    return 0.5 + width * len(planners), 0.35 + (width * shape + 0.25) * len(places)
+def _shape(played: Played) -> float:
+    """Return height over width of a world, within what a panel can be."""
+    x0, y0, x1, y1 = played.world.bounds
+    return min(2.5, max(0.3, (y1 - y0) / (x1 - x0)))
 
 
 def _panel(axes: Axes, played: Played | None, colour: str, thin: float) -> None:
@@ -83,7 +84,7 @@ def _panel(axes: Axes, played: Played | None, colour: str, thin: float) -> None:
         axes.text(0.5, 0.5, "not run", transform=axes.transAxes, ha="center", color=FAINT)
         return
     frame(axes, played)
-    _draw_obstacles(axes, played.world.obstacles)
+    draw_world(axes, played.world.obstacles)
     thin *= 0.5 if played.x.shape[1] > MANY else 1.0
     for i in range(played.x.shape[1]):
         good = bool(played.arrived[i])

@@ -111,12 +111,21 @@ def _swapped(judged: dict[tuple[str, str], list[Swap]]) -> str:
         for (metric, place), swaps in judged.items():
             for swap in swaps:
                 if swap.is_evidence is real:
-                    where.setdefault((swap.better, swap.worse), {}).setdefault(metric, []).append(place)
+                    shown = f"{place}: {_gap(metric, swap)}" if real else place
+                    where.setdefault((swap.better, swap.worse), {}).setdefault(metric, []).append(shown)
         for (better, worse), by_metric in where.items():
             names = [f"{words.in_text(metric)} ({', '.join(places)})" for metric, places in by_metric.items()]
             says = "which the paired differences confirm" if real else "without evidence in the paired differences"
             sentences.append(f" {better} is behind {worse} by {words.listed(names)}, {says}.")
     return "".join(sentences)
+
+
+def _gap(metric: str, swap: Swap) -> str:
+    """Return the paired difference of two planners with interval, p value and number of maps."""
+    if swap.gap.used == 0:
+        return "no map in common"
+    gap = f"{words.difference(metric, swap.gap.estimate)} {words.interval(metric, swap.gap, True)}".strip()
+    return f"{gap}, {words.p_words(swap.gap.p_value)}, {words.count(swap.gap.used, 'map')}"
 
 
 def order_table(material: Material) -> Table | None:
@@ -144,10 +153,7 @@ def _order_cell(material: Material, metric: str, place: str) -> list[Line]:
     if not swaps:
         return [Line("holds", "main", "good"), *_printed_order(material, metric, place)]
     lines = [Line(" < ".join(ranked), "main", "bad" if any(swap.is_evidence for swap in swaps) else "")]
-    for swap in swaps:
-        gap = f"{words.difference(metric, swap.gap.estimate)} {words.interval(metric, swap.gap, True)}"
-        chance = f"{words.p_words(swap.gap.p_value)}, {words.count(swap.gap.used, 'map')}"
-        lines.append(Line(f"{swap.better} − {swap.worse}: {gap}, {chance}", "sub"))
+    lines += [Line(f"{swap.better} − {swap.worse}: {_gap(metric, swap)}", "sub") for swap in swaps]
     return [*lines, *_printed_order(material, metric, place)]
 
 

@@ -45,7 +45,7 @@ SUMMARIES = {
     "path_stretch": "Σl / Σl*, sums over the robots that arrived",
     "path_stretch_any_angle": "Σl over the sum of the true shortest ways, robots that arrived",
 }
-DECIMAL = frozenset({"s", "kbps"})
+DECIMAL = frozenset({"s"})
 STEPS = {"B": ("B", "kB", "MB", "GB"), "us": ("µs", "ms", "s")}
 
 
