@@ -18,6 +18,8 @@ from swarmscope.onboard.perception.safety import beam_of, corridor_length, safe_
 from swarmscope.onboard.planning._contract import ADVANCE, ESCAPE, FOLLOW, R_DEAD_END, R_FOLLOW, R_LOOP, R_LOST
 from swarmscope.onboard.planning._memory import LOG, say
 
+REOPEN_WITHIN = 1.0
+"""A following changes sides only for a direction this near to the target [rad]."""
 LEAVE_GAIN = 0.5
 """How much closer than ever before to the goal the free way must lead for a strict following to end [m]."""
 
@@ -97,6 +99,26 @@ def resume(percept: Row, memory: Row, resume_m: float) -> bool:
         return False
     begin_following(percept, memory, memory["last_side"])
     return True
+
+
+@jit
+def reconsider(
+    percept: Row, shared: Row, memory: Row, safe: np.ndarray, rig: Rig, loop_m: float, reopen: float, told: int
+) -> None:
+    """Change sides when another obstacle stands in the way now: the way past it on the other side turns off less.
+
+    Less by ``reopen`` [rad] than this following has turned off the target; 0 keeps the side as printed. A robot
+    that is ``told`` its side (0: it is not) keeps to that. Changing back at the same place is a loop.
+    """
+    side = memory["side"]
+    if reopen <= 0.0 or memory["strict"] or told == side:
+        return
+    other = turn_to_safe(percept, safe, -side, rig)
+    if other >= REOPEN_WITHIN:
+        return
+    wind = memory["wind"] - side * wrap_angle(percept["compass"] + percept["goal_bearing"] - memory["target"])
+    if other + reopen < max(wind, turn_to_safe(percept, safe, side, rig)):
+        begin_following(percept, memory, break_loop(percept, shared, memory, loop_m, -side))
 
 
 @jit

@@ -39,6 +39,9 @@ class Params(NamedTuple):
     """A following turns back towards the target by at most this in one tick [rad]."""
     resume_m: float = 0.5
     """An obstacle met so soon after a following ended is the same one: the side stays."""
+    reopen: float = 0.8
+    """A following changes sides when the way on the other side turns off the target by this much less [rad];
+    0 as printed."""
     loop_m: float = 1.0
     """A second choice of side this close to an earlier one, without progress, is a loop."""
 
@@ -70,6 +73,7 @@ def step(
         stuck_s=params.stuck_s,
         turn_back=params.turn_back,
         resume_m=params.resume_m,
+        reopen=params.reopen,
         loop_m=params.loop_m,
     )
     nav_scope_step(ranges, percept, shared, memory, decision, scratch, row, rig, full, told)

@@ -36,6 +36,7 @@ from swarmscope.onboard.planning._following import (
     follow,
     may_leave,
     nearest_in_sight,
+    reconsider,
     resume,
     side_bias,
     watch_progress,
@@ -87,6 +88,9 @@ class Params(NamedTuple):
     """A following turns back towards the target by at most this in one tick [rad]."""
     resume_m: float = 0.5
     """An obstacle met so soon after a following ended is the same one: the side stays."""
+    reopen: float = 0.8
+    """A following changes sides when the way on the other side turns off the target by this much less [rad];
+    0 as printed."""
     loop_m: float = 1.0
     """A second choice of side this close to an earlier one, without progress, is a loop."""
 
@@ -132,6 +136,8 @@ def step(
         elif memory["mode"] == FOLLOW or _decide(
             percept, shared, memory, decision, rig, params, work, safe, angles, distances, count
         ):
+            if not decision["fused"]:
+                reconsider(percept, shared, memory, safe, rig, params.loop_m, params.reopen, 0)
             follow(
                 ranges, work, percept, memory, decision, safe, safe_count, narrow, edges, rig,
                 params.wide_turn, params.turn_back, speed,
