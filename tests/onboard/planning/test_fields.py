@@ -125,7 +125,7 @@ def test_the_mirrored_scene_has_the_opposite_own_probability(pairs, bias):
     assert own_probability(*as_arrays(pairs, True), HALF_ALPHA, -bias, False) == pytest.approx(1.0 - p, abs=1e-9)
 
 
-def decide(pairs, neighbours, goal_bearing=0.0, compass=0.0, mirror=False, w_i=1.0, bias=0.0):
+def decide(pairs, neighbours, goal_bearing=0.0, compass=0.0, mirror=False, w_i=1.0, bias=0.0, polygon=False):
     """Robot 0 with features ``pairs``, neighbours (distance, bearing, features), in the compass frame."""
     rows = Rows(rig_of())
     sign = -1.0 if mirror else 1.0
@@ -146,7 +146,7 @@ def decide(pairs, neighbours, goal_bearing=0.0, compass=0.0, mirror=False, w_i=1
         rows.rig,
         w_i,
         sign * bias,
-        False,
+        polygon,
         angles,
         distances,
         count,
@@ -216,3 +216,21 @@ def test_a_neighbour_on_the_left_with_a_free_way_pulls_left():
     assert decide(pairs, [(1.5, 0.5, shut)])[2] < 0.5
     assert decide(pairs, [(1.5, -0.5, free)])[2] < 0.5
     assert decide(pairs, [(1.5, -0.5, shut)])[2] > 0.5
+
+
+def test_the_polygon_reading_takes_triangles_and_chords():
+    """One neighbour; its quadrants I and II hold no feature, so their borders count: on the chord of 1.2 rad."""
+    pairs = [(0.5, 2.0), (2.0, 1.0), (4.0, 2.5)]
+    heard = [(0.6, 3.0), (TWO_PI - 0.6, 3.0)]
+    _, p_self, p_left, _ = decide(pairs, [(1.5, 0.4, heard)], polygon=True)
+    angles, distances, count = as_arrays(pairs)
+    distances[:count] = distances[:count] / 5.0 + 1.0
+    assert p_self == pytest.approx(own_probability(angles, distances, count, HALF_ALPHA, 0.0, True))
+    assert p_self != pytest.approx(own_probability(angles, distances, count, HALF_ALPHA, 0.0, False), abs=1e-4)
+    border = 1.6 * math.cos(0.6) / math.cos(HALF_ALPHA)  # the farther of the two borders of each quadrant
+    force = interaction_force(1.5, SIGMA, 1.0)
+    follow = sigmoid(2.0 * border - 2.0 * (1.95 / 5.0 + 1.0))
+    assert p_left == pytest.approx((p_self + force * follow) / (1.0 + force), abs=1e-6)
+    _, p_self, p_left, _ = decide(pairs, [(1.5, 0.4, heard)])
+    follow = sigmoid(2.0 * 1.6 - 2.0 * (1.95 / 5.0 + 1.0))  # linear in the angle: 1.6 all along
+    assert p_left == pytest.approx((p_self + force * follow) / (1.0 + force), abs=1e-6)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from helpers import Rows, circle, circles_world, place_scenario, rig_of, run_scenario, scan_at, wall
 from swarmscope.onboard.perception.areas import normalise, passable_distance
-from swarmscope.onboard.planning import sfm_i, sfm_mas
+from swarmscope.onboard.planning import nav_scope, sfm_i, sfm_mas
 from swarmscope.onboard.planning._contract import ADVANCE, DECIDE, FOLLOW, YIELD
 from swarmscope.onboard.planning.fields import (
     following_probability,
@@ -162,6 +162,16 @@ def test_it_decides_at_once_when_nobody_is_in_the_pass_band():
     rows.see((1, 3.2, 0.8, 0.0))
     decision = step(rows, memory)
     assert (decision["n_out"], decision["fused"], decision["side"]) == (0, 1, -1)
+
+
+def test_its_own_opinion_is_by_triangles():
+    opinions = []
+    for planner in (sfm_mas, nav_scope):
+        rows, memory = rows_before((1.2, 0.05, 0.3), (0.5, 1.5, 0.4))
+        arrays = (rows.ranges, rows.percepts, rows.shared, memory, rows.decisions, rows.scratch)
+        planner.step_all(0, 1, *arrays, rows.rig, planner.Params(prior=0.0))
+        opinions.append(float(rows.decisions["p_self"][0]))
+    assert abs(opinions[0] - opinions[1]) > 1e-3
 
 
 NEAR = interaction_force(0.5, 0.9, 1.0)
