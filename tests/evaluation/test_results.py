@@ -7,7 +7,7 @@ from swarmscope.evaluation.results import Run, cell_of, cells_of, paired, pooled
 
 
 def run(planner="ours", seed=0, travelled=(10.0, 12.0), shortest=(10.0, 10.0), arrival=(22.0, 30.0), **figures):
-    known = {"duration_s": np.nanmax(arrival), "waiting_s": 1.0, "path_redundancy": 0.1, "collisions": 0.0}
+    known = {"duration_s": max(arrival), "waiting_s": 1.0, "path_redundancy": 0.1, "collisions": 0.0}
     arrays = [np.array(values, float) for values in (travelled, shortest, arrival)]
     config = {"robot": {"v_max_mps": 0.5}}
     return Run("T1", planner, seed, f"{planner}{seed}", config, known | figures, *arrays, failures=[], cases=[])

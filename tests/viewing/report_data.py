@@ -94,7 +94,7 @@ def played(unit: Unit) -> Run:
         config=complete(unit.scenario),
         figures={k: v for k, v in found.items() if isinstance(v, (int, float)) and np.isfinite(v)},
         travelled_m=path_lengths(records.x, records.y, outcome.trace.t_s, robots["arrival_s"]),
-        shortest_m=outcome.shortest_m,
+        shortest_m=outcome.references.shortest_m,
         arrival_s=robots["arrival_s"].copy(),
         failures=found["failures"],
         cases=find_cases(outcome.trace.choices, outcome.setting.dt),

@@ -20,6 +20,8 @@ from swarmscope.onboard.planning._memory import LOG, say
 
 REOPEN_WITHIN = 1.0
 """A following changes sides only for a direction this near to the target [rad]."""
+REOPEN_AHEAD = 0.5 * math.pi
+"""And only for one this near to where it looks: who turns back along the same border finds nothing new [rad]."""
 LEAVE_GAIN = 0.5
 """How much closer than ever before to the goal the free way must lead for a strict following to end [m]."""
 
@@ -114,7 +116,7 @@ def reconsider(
     if reopen <= 0.0 or memory["strict"] or told == side:
         return
     other = turn_to_safe(percept, safe, -side, rig)
-    if other >= REOPEN_WITHIN:
+    if other >= REOPEN_WITHIN or abs(wrap_angle(percept["goal_bearing"] - side * other)) > REOPEN_AHEAD:
         return
     wind = memory["wind"] - side * wrap_angle(percept["compass"] + percept["goal_bearing"] - memory["target"])
     if other + reopen < max(wind, turn_to_safe(percept, safe, side, rig)):
