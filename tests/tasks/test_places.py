@@ -10,6 +10,7 @@ from swarmscope.evaluation.shortest_path import grid_paths, lengths_m
 from swarmscope.sim.contact import static_clearance
 from swarmscope.sim.world import Circle, Polygon, Wall, WorldSpec, compile_world
 from swarmscope.tasks import Setup, check_setup, load_task
+from swarmscope.tasks._check import Reach, unreachable
 from swarmscope.tasks._rooms import WALL_M, bar, goal_ranks, ranks, spacing
 from swarmscope.tasks.depository import DepositoryOptions, draw_room
 
@@ -169,6 +170,13 @@ def test_things_keep_off_each_other_and_the_robots() -> None:
         away = np.hypot(*(points[:, None] - centres[None]).transpose(2, 0, 1)) - reach
         assert away.min() >= 0.73 - 1e-9
         assert (centres[:, 1] - reach).min() >= -1e-9 and (centres[:, 1] + reach).max() <= 7.0 + 1e-9
+
+
+def test_more_room_can_be_asked_for() -> None:
+    for seed in range(6):
+        setup = load_task("depository").make(seed, spare_m=0.3, size=0.5)
+        assert unreachable(setup, Reach(0.43, 0.28)).size == 0
+    assert load_task("depository").make(1, spare_m=0.3).world != load_task("depository").make(1).world
 
 
 def around(corners: np.ndarray) -> tuple[np.ndarray, float]:

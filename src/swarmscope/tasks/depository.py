@@ -46,6 +46,7 @@ class DepositoryOptions:
     width_m: float = 7.0  # wider for more robots than fit side by side
     density: float = 0.38  # things per m^2 of the cluttered floor
     size: float = 1.0  # of the things, times ours
+    spare_m: float = 0.1  # that a way leaves on both sides; r_e + 0.1 m is the published r = 0.49 m + 0.04 m
 
 
 class _Thing(NamedTuple):
@@ -59,7 +60,7 @@ def make(seed: int, robots: int = 5, radius: float = 0.43, **options: Option) ->
     chosen = read_options(DepositoryOptions, options, NAME)
     for draw in range(REDRAWS + 1):
         setup = draw_room(seed, draw, robots, radius, chosen)
-        if unreachable(setup, Reach(radius)).size == 0:
+        if unreachable(setup, Reach(radius, chosen.spare_m)).size == 0:
             check_setup(setup, radius)
             return setup
     raise UnsolvableWorldError(
