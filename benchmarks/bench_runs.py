@@ -36,7 +36,7 @@ def costs(planner: str, seed: int) -> dict[str, float]:
     references = find_references(scenario, setup)
     times.append(time.perf_counter())
     if getattr(load_planner(planner), "TOLD_SIDE", False):
-        make_advice(setup, scenario.robot.radius_m)
+        make_advice(setup, scenario.robot.radius_m + scenario.safety.margin_m)
     times.append(time.perf_counter())
     run_s = play(scenario, references=references).trace.wall_s
     config = complete(scenario)

@@ -15,11 +15,11 @@ from swarmscope.tasks._occupancy import Raster
 from swarmscope.tasks._search import Searcher
 
 
-def side(obstacles, start=(-4.0, 0.0), goal=(4.0, 0.0)):
+def side(obstacles, start=(-4.0, 0.0), goal=(4.0, 0.0), horizon=math.inf):
     values = place_scenario([(*start, 0.0)], [goal], obstacles)
     advice = make_advice(make_setup(parse_scenario(values, "test")), 0.15)
     cells = [(p - o) / advice.resolution for p, o in zip((*start, *goal), (advice.x0, advice.y0) * 2, strict=True)]
-    return side_of_way(advice.cost[0], *cells)
+    return side_of_way(advice.cost[0], *cells, horizon / advice.resolution)
 
 
 def box(x0, y0, x1, y1):
@@ -32,6 +32,11 @@ def test_the_shorter_way_round():
     assert side([circle(0.0, -0.3, 1.0)]) == 1
     assert side([circle(0.0, 0.3, 1.0)], (4.0, 0.0), (-4.0, 0.0)) == 1  # the other way round, right is left
     assert side([circle(0.0, 2.0, 1.0)]) == 0  # beside the way
+
+
+def test_what_is_far_ahead_is_worth_no_side_yet():
+    assert side([circle(0.0, 0.3, 1.0)], horizon=2.0) == 0
+    assert side([circle(0.0, 0.3, 1.0)], horizon=3.0) == -1
 
 
 def test_only_the_first_obstacle_counts():
@@ -50,7 +55,7 @@ def test_no_way_no_side():
     spec = WorldSpec(obstacles=walls, bounds=(-5, -5, 5, 5))
     advice = make_advice(Setup(spec, np.array([[-4.0, 0.0, 0.0]]), np.array([[0.0, 0.0]])), 0.15)
     cells = [(p - o) / advice.resolution for p, o in zip((-4.0, 0.0) * 2, (advice.x0, advice.y0) * 2, strict=True)]
-    assert side_of_way(advice.cost[0], *cells[:2], cells[2] + 80.0, cells[3]) == 0
+    assert side_of_way(advice.cost[0], *cells[:2], cells[2] + 80.0, cells[3], math.inf) == 0
 
 
 @given(st.integers(0, 10_000))

@@ -67,7 +67,9 @@ def play(
     setup = make_setup(scenario)
     setting = make_setting(scenario, setup, threads)
     if judge_sides or getattr(setting.planner, "TOLD_SIDE", False):
-        setting = replace(setting, advice=make_advice(setup, scenario.robot.radius_m))
+        keeps_off = scenario.robot.radius_m + scenario.safety.margin_m
+        horizon = max(setting.rig.look_ahead, setting.rig.protection.l_th) + setting.rig.body.radius
+        setting = replace(setting, advice=make_advice(setup, keeps_off, horizon))
     trace = run(setting, progress)
     if references is None:
         references = find_references(scenario, setup, any_angle)

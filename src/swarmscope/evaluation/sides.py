@@ -19,10 +19,14 @@ MOST_FIELDS = 200
 """More robots than this would take gigabytes."""
 
 
-def make_advice(setup: Setup, radius: float, resolution: float = RESOLUTION_M) -> Advice:
-    """Return the cost to go of every robot's goal, over the grid that the reference ways are searched on.
+def make_advice(
+    setup: Setup, radius: float, horizon_m: float = math.inf, resolution: float = RESOLUTION_M
+) -> Advice:
+    """Return the cost to go of every robot's goal, on a grid like that of the reference ways.
 
-    Robots of ``radius`` [m]; other robots are not obstacles. Raises ValueError for more than MOST_FIELDS robots.
+    ``radius`` [m] is what the ways keep off obstacles: a planner's own margin included, so that what blocks it
+    blocks them. Other robots are not obstacles. Sides are told of what stands within ``horizon_m``. Raises
+    ValueError for more than MOST_FIELDS robots.
     """
     if len(setup.goals) > MOST_FIELDS:
         raise ValueError(f"costs to go of {len(setup.goals)} robots; at most {MOST_FIELDS} fit into memory")
@@ -30,7 +34,7 @@ def make_advice(setup: Setup, radius: float, resolution: float = RESOLUTION_M) -
     raster = rasterise(compile_world(spec), radius, domain_of(spec, [setup.starts, setup.goals]), resolution)
     cells = free_cells_near(raster, setup.goals, SNAP_CELLS)
     fields = [cost_to_go(raster.blocked, int(row), int(column)) for row, column in cells]
-    return Advice(np.stack(fields), np.arange(len(cells)), raster.x0, raster.y0, raster.resolution)
+    return Advice(np.stack(fields), np.arange(len(cells)), raster.x0, raster.y0, raster.resolution, horizon_m)
 
 
 @jit

@@ -1,9 +1,10 @@
 """What no robot knows: on which side of the obstacle ahead the shortest way passes. For oracles and for judging.
 
 *The side of a way.* On the straight line from the robot to its goal the first blocked stretch begins at progress
-b and ends at progress e. The shortest way (steepest descent of the cost to go) is followed until its progress
-along that line first reaches (b + e) / 2; the sign of its lateral offset there is the side, +1 left. A way that
-arrives without ever being so far along has the side of its largest offset. 0: the line is free, or there is no way.
+b, within the robot's horizon, and ends at progress e. The shortest way (steepest descent of the cost to go) is
+followed until its progress along that line first reaches (b + e) / 2; the sign of its lateral offset there is the
+side, +1 left. A way that arrives without ever being so far along has the side of its largest offset. 0: the line is
+free so far, or there is no way.
 """
 
 from __future__ import annotations
@@ -30,6 +31,8 @@ class Advice(NamedTuple):
     x0: float
     y0: float
     resolution: float
+    horizon_m: float
+    """How far ahead something must stand in the way to be worth a side."""
 
 
 @jit
@@ -43,11 +46,14 @@ def tell_sides(sim: Sim, advice: Advice) -> None:
             (robot["y"] - advice.y0) / advice.resolution,
             (robot["goal_x"] - advice.x0) / advice.resolution,
             (robot["goal_y"] - advice.y0) / advice.resolution,
+            advice.horizon_m / advice.resolution,
         )
 
 
 @jit
-def side_of_way(cost: np.ndarray, x: float, y: float, goal_x: float, goal_y: float) -> int:
+def side_of_way(
+    cost: np.ndarray, x: float, y: float, goal_x: float, goal_y: float, horizon: float
+) -> int:
     """Return the side (+1 left, -1 right, 0 none) of the shortest way from (x, y); all lengths in cells."""
     dx, dy = goal_x - x, goal_y - y
     apart = math.sqrt(dx * dx + dy * dy)
@@ -55,7 +61,7 @@ def side_of_way(cost: np.ndarray, x: float, y: float, goal_x: float, goal_y: flo
         return 0
     ux, uy = dx / apart, dy / apart
     begin, end = _blocked_stretch(cost, x, y, ux, uy, apart)
-    if begin < 0.0:
+    if begin < 0.0 or begin > horizon:
         return 0
     row, column = _start_cell(cost, int(y), int(x))
     if row < 0:

@@ -2,7 +2,9 @@
 
 Published (Nav-SCOPE VII, SFM-MAS VI): 5 robots of r_e = 0.43 m, 0.38 obstacles per m^2 of various shapes, a
 mean path of 10.77 m with gamma = 3.8 %, so shortest ways of 10.4 m. Everything else is ours: the room, the
-mix and sizes of the shapes, and that the robots go from one side to the other in the order of their starts.
+mix and sizes of the shapes, that the robots go from one side to the other in the order of their starts, and that
+things stand in stacks with aisles between them, as people put them. At this density nearly every gap between
+things that stand about one by one is too narrow for such robots (``stack=1, aisle_m=0.1`` makes that room).
 """
 
 from __future__ import annotations
@@ -27,8 +29,8 @@ SUMMARY = "five wide robots (robot.radius_m=0.43) through a cluttered store room
 REDRAWS = 40
 TRIES_PER_THING = 2000
 WALL_SIDE_M = 1.5  # from the lines of starts and goals to the walls behind them
-CLEAR_M = 0.75  # from these lines to the cluttered floor
-GAP_M = 0.1  # between two things, at least (of their bounding circles)
+CLEAR_M = 1.4  # from these lines to the cluttered floor: room to pass a robot that has arrived
+TOUCH_M = 0.02  # between the bounding circles of one stack's things
 BOX_M = (0.2, 0.4)  # sides of boxes
 DRUM_M = (0.08, 0.2)  # radii of drums
 SHELF_M = ((0.6, 0.9), (0.1, 0.2))  # lengths and depths of shelves
@@ -42,10 +44,12 @@ Floats = NDArray[np.float64]
 class DepositoryOptions:
     """Sizes of the room."""
 
-    way_m: float = 8.8  # from the starts to the goals
+    way_m: float = 9.8  # from the starts to the goals
     width_m: float = 7.0  # wider for more robots than fit side by side
     density: float = 0.38  # things per m^2 of the cluttered floor
     size: float = 1.0  # of the things, times ours
+    stack: float = 4.0  # things in a stack, at most
+    aisle_m: float = 1.0  # between stacks, and between stacks and walls, at least
     spare_m: float = 0.1  # that a way leaves on both sides; r_e + 0.1 m is the published r = 0.49 m + 0.04 m
 
 
@@ -54,19 +58,47 @@ class _Thing(NamedTuple):
     reach: float  # radius of the bounding circle [m]
 
 
+class _Stack(NamedTuple):
+    things: list[_Thing]
+    offsets: Floats  # (N, 2) from the stack's middle [m]
+    reach: float  # radius of the bounding circle [m]
+
+
+class _NoRoomError(Exception):
+    """One draw of the things does not fit."""
+
+
 def make(seed: int, robots: int = 5, radius: float = 0.43, **options: Option) -> Setup:
     """Return a solvable store room; draw d uses the random stream (seed, d)."""
     check_robots(robots, radius)
     chosen = read_options(DepositoryOptions, options, NAME)
+    fits = False
     for draw in range(REDRAWS + 1):
-        setup = draw_room(seed, draw, robots, radius, chosen)
-        if unreachable(setup, Reach(radius, chosen.spare_m)).size == 0:
+        try:
+            setup = draw_room(seed, draw, robots, radius, chosen)
+        except _NoRoomError:
+            continue
+        fits = True
+        if _is_solvable(setup, radius, chosen.spare_m):
             check_setup(setup, radius)
             return setup
+    if not fits:
+        raise ConfigError(f"task {NAME}: density", f"things of {chosen.density:g} per m^2 do not fit into the room")
     raise UnsolvableWorldError(
         f"no solvable depository in {REDRAWS + 1} draws of seed {seed} for robots of radius {radius:g} m; "
         "lower the density or the radius"
     )
+
+
+def _is_solvable(setup: Setup, radius: float, spare: float) -> bool:
+    """Tell whether every robot has a way when all the others have arrived, which then stand in its way."""
+    parked = [Circle(center=(x, y), radius=radius) for x, y in setup.goals.tolist()]
+    for i in range(len(parked)):
+        obstacles = [*setup.world.obstacles, *parked[:i], *parked[i + 1 :]]
+        spec = WorldSpec(obstacles=obstacles, bounds=setup.world.bounds)
+        if unreachable(Setup(spec, setup.starts[i : i + 1], setup.goals[i : i + 1]), Reach(radius, spare)).size:
+            return False
+    return True
 
 
 def draw_room(seed: int, draw: int, robots: int, radius: float, options: DepositoryOptions) -> Setup:
@@ -82,7 +114,8 @@ def draw_room(seed: int, draw: int, robots: int, radius: float, options: Deposit
     keep_off = np.vstack([starts[:, :2], goals])
     rng = np.random.default_rng([seed, draw])
     count = round(options.density * (floor[2] - floor[0]) * width)
-    things = _place(rng, _draw_things(rng, count, options.size), floor, keep_off, max(MARGIN_M, radius + ROOM_M))
+    stacks = _stack(rng, _draw_things(rng, count, options.size), options.stack)
+    things = _place(rng, stacks, floor, keep_off, max(MARGIN_M, radius + ROOM_M), options.aisle_m)
     x0, x1 = -WALL_SIDE_M, way + WALL_SIDE_M
     edge = 2.0 * WALL_M
     world = WorldSpec(
@@ -111,26 +144,49 @@ def _draw_things(rng: np.random.Generator, count: int, size: float) -> list[_Thi
     return sorted(things, key=lambda thing: -thing.reach)
 
 
+def _stack(rng: np.random.Generator, things: list[_Thing], most: float) -> list[_Stack]:
+    """Return the things in stacks of 1 to ``most``, the widest stack first: it is the hardest to place."""
+    stacks = []
+    left = [things[k] for k in rng.permutation(len(things))]
+    while left:
+        count = min(len(left), int(rng.integers(1, max(1, int(most)) + 1)))
+        stacks.append(_as_stack(left[:count], float(rng.uniform(0.0, 2.0 * math.pi))))
+        left = left[count:]
+    return sorted(stacks, key=lambda stack: -stack.reach)
+
+
+def _as_stack(things: list[_Thing], turn: float) -> _Stack:
+    """Return the things side by side on a ring round the stack's middle."""
+    widest = max(thing.reach for thing in things)
+    count = len(things)
+    ring = (widest + 0.5 * TOUCH_M) / math.sin(math.pi / count) if count > 1 else 0.0
+    angles = turn + 2.0 * math.pi * np.arange(count) / count
+    return _Stack(things, ring * np.column_stack([np.cos(angles), np.sin(angles)]), ring + widest)
+
+
 def _place(
-    rng: np.random.Generator, things: list[_Thing], floor: Box, keep_off: Floats, margin: float
+    rng: np.random.Generator, stacks: list[_Stack], floor: Box, keep_off: Floats, margin: float, aisle: float
 ) -> list[Obstacle]:
-    """Return the things at random places of the floor (x0, y0, x1, y1), off each other and the points."""
+    """Return the things, their stacks at random places of the floor (x0, y0, x1, y1), off each other and the points."""
     x0, y0, x1, y1 = floor
-    centres, reach = np.zeros((len(things), 2)), np.array([thing.reach for thing in things])
+    centres, reach = np.zeros((len(stacks), 2)), np.array([stack.reach for stack in stacks])
     found: list[Obstacle] = []
-    for k, thing in enumerate(things):
+    for k, stack in enumerate(stacks):
+        low, high = np.array([x0 + reach[k], y0 + reach[k] + aisle]), np.array([x1 - reach[k], y1 - reach[k] - aisle])
         for _ in range(TRIES_PER_THING):
-            point = rng.uniform((x0 + reach[k], y0 + reach[k]), (x1 - reach[k], y1 - reach[k]))
+            point = rng.uniform(low, np.maximum(low, high))
             if np.any(np.hypot(*(keep_off - point).T) < margin + reach[k]):
                 continue
-            if not np.any(np.hypot(*(centres[:k] - point).T) < reach[:k] + reach[k] + GAP_M):
+            if not np.any(np.hypot(*(centres[:k] - point).T) < reach[:k] + reach[k] + aisle):
                 break
         else:
-            raise ConfigError(f"task {NAME}: density", f"{len(things)} things do not fit into the room")
+            raise _NoRoomError
         centres[k] = point
-        x, y = point.tolist()
-        if thing.outline is None:
-            found.append(Circle(center=(x, y), radius=thing.reach))
-        else:
-            found.append(polygon(thing.outline + point))
+        found += [_put(thing, point + offset) for thing, offset in zip(stack.things, stack.offsets, strict=True)]
     return found
+
+
+def _put(thing: _Thing, point: Floats) -> Obstacle:
+    if thing.outline is None:
+        return Circle(center=(float(point[0]), float(point[1])), radius=thing.reach)
+    return polygon(thing.outline + point)
