@@ -105,15 +105,15 @@ def resume(percept: Row, memory: Row, resume_m: float) -> bool:
 
 @jit
 def reconsider(
-    percept: Row, shared: Row, memory: Row, safe: np.ndarray, rig: Rig, loop_m: float, reopen: float, told: int
+    percept: Row, shared: Row, memory: Row, safe: np.ndarray, rig: Rig, loop_m: float, reopen: float
 ) -> None:
     """Change sides when another obstacle stands in the way now: the way past it on the other side turns off less.
 
-    Less by ``reopen`` [rad] than this following has turned off the target; 0 keeps the side as printed. A robot
-    that is ``told`` its side (0: it is not) keeps to that. Changing back at the same place is a loop.
+    Less by ``reopen`` [rad] than this following has turned off the target; 0 keeps the side as printed. Changing
+    back at the same place is a loop.
     """
     side = memory["side"]
-    if reopen <= 0.0 or memory["strict"] or told == side:
+    if reopen <= 0.0 or memory["strict"]:
         return
     other = turn_to_safe(percept, safe, -side, rig)
     if other >= REOPEN_WITHIN or abs(wrap_angle(percept["goal_bearing"] - side * other)) > REOPEN_AHEAD:

@@ -243,7 +243,7 @@ def decide(
             ):
                 return
         else:
-            reconsider(percept, shared, memory, safe, rig, params.loop_m, params.reopen, told)
+            reconsider(percept, shared, memory, safe, rig, params.loop_m, params.reopen)
         follow(
             ranges, masked, percept, memory, decision, safe, safe_count, narrow, edges, rig,
             params.wide_turn, params.turn_back, speed,

@@ -137,7 +137,7 @@ def step(
             percept, shared, memory, decision, rig, params, work, safe, angles, distances, count
         ):
             if not decision["fused"]:
-                reconsider(percept, shared, memory, safe, rig, params.loop_m, params.reopen, 0)
+                reconsider(percept, shared, memory, safe, rig, params.loop_m, params.reopen)
             follow(
                 ranges, work, percept, memory, decision, safe, safe_count, narrow, edges, rig,
                 params.wide_turn, params.turn_back, speed,
