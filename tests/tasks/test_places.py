@@ -12,7 +12,6 @@ from swarmscope.sim.world import Circle, Polygon, Wall, WorldSpec, compile_world
 from swarmscope.tasks import Setup, check_setup, load_task
 from swarmscope.tasks._check import Reach, unreachable
 from swarmscope.tasks._rooms import WALL_M, bar, goal_ranks, ranks, spacing
-from swarmscope.tasks.depository import DepositoryOptions, draw_room
 
 PLACES = {"long_wall": 4, "u_trap": 4, "doorway": 6, "corridor": 6, "intersection": 8, "depository": 5}
 STUCK = [name for name in PLACES if name != "depository"]
@@ -148,7 +147,7 @@ def test_the_store_room_is_as_dense_and_as_long_as_published() -> None:
     for seed in range(1000, 1012):
         setup = load_task("depository").make(seed)
         things = setup.world.obstacles[4:]
-        assert len(things) == round(0.38 * (8.8 - 1.5) * 7.0)
+        assert len(things) == round(0.38 * (9.8 - 2.8) * 7.0)
         kinds = {"drum" if isinstance(o, Circle) else len(o.points) for o in things}
         assert {"drum", 4} <= kinds
         ways = grid_paths(setup.world, setup.starts, setup.goals, 0.43)
@@ -156,20 +155,35 @@ def test_the_store_room_is_as_dense_and_as_long_as_published() -> None:
     assert abs(np.mean(lengths) - 10.4) < 0.5
 
 
-def test_things_keep_off_each_other_and_the_robots() -> None:
-    for draw in range(5):
-        setup = draw_room(1000, draw, 5, 0.43, DepositoryOptions())
+def test_stacks_keep_aisles_and_the_robots_room() -> None:
+    for seed in range(1000, 1006):
+        setup = load_task("depository").make(seed)
         things = [
             (np.array(o.center), o.radius) if isinstance(o, Circle) else around(corners_of(o))
             for o in setup.world.obstacles[4:]
         ]
         centres, reach = np.array([c for c, _ in things]), np.array([r for _, r in things])
         gaps = np.hypot(*(centres[:, None] - centres[None]).transpose(2, 0, 1)) - reach - reach[:, None]
-        assert gaps[np.triu_indices(len(reach), 1)].min() >= 0.1 - 1e-9
+        same_stack = gaps < 1.0 - 1e-9
+        assert same_stack.sum(axis=1).max() <= 4
+        assert np.array_equal(same_stack @ same_stack, same_stack)  # nobody is near two stacks
+        assert gaps[np.triu_indices(len(reach), 1)].min() >= 0.02 - 1e-9
         points = np.vstack([setup.starts[:, :2], setup.goals])
         away = np.hypot(*(points[:, None] - centres[None]).transpose(2, 0, 1)) - reach
-        assert away.min() >= 0.73 - 1e-9
-        assert (centres[:, 1] - reach).min() >= -1e-9 and (centres[:, 1] + reach).max() <= 7.0 + 1e-9
+        assert away.min() >= 1.3
+        assert (centres[:, 1] - reach).min() >= 1.0 - 1e-9 and (centres[:, 1] + reach).max() <= 6.0 + 1e-9
+
+
+def test_who_has_arrived_blocks_nobody() -> None:
+    setup = load_task("depository").make(1000)
+    parked = [Circle(center=tuple(goal), radius=0.43) for goal in setup.goals[1:].tolist()]
+    spec = WorldSpec(obstacles=[*setup.world.obstacles, *parked], bounds=setup.world.bounds)
+    assert unreachable(Setup(spec, setup.starts[:1], setup.goals[:1]), Reach(0.43, 0.1)).size == 0
+
+
+def test_things_may_stand_one_by_one() -> None:
+    setup = load_task("depository").make(1000, stack=1, aisle_m=0.1)
+    assert len(setup.world.obstacles) == len(load_task("depository").make(1000).world.obstacles)
 
 
 def test_more_room_can_be_asked_for() -> None:
@@ -190,7 +204,7 @@ def test_a_store_room_that_cannot_be_is_an_error() -> None:
     with pytest.raises(ConfigError, match="way_m"):
         load_task("depository").make(0, way_m=2.0)
     with pytest.raises(UnsolvableWorldError, match="no solvable depository in 41 draws"):
-        load_task("depository").make(0, density=0.8, size=1.2)
+        load_task("depository").make(0, spare_m=0.8)
 
 
 def test_a_wall_that_does_not_reach_across_the_robots_is_an_error() -> None:
