@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from swarmscope.evaluation.results import Run, cell_of, cells_of, paired, pooled_figures, time_budget, values_of
+from swarmscope.evaluation.results import Run, grouped, paired, pooled_figures, time_budget, values_of
 
 
 def run(planner="ours", seed=0, travelled=(10.0, 12.0), shortest=(10.0, 10.0), arrival=(22.0, 30.0), **figures):
@@ -22,14 +22,12 @@ def test_sums_go_over_the_robots_of_all_maps():
     assert found["spl"] == pytest.approx((1.0 + 0.5 + 0.8 + 0.0) / 4.0)
 
 
-def test_cell():
-    runs = [run(), run(seed=1, arrival=(20.0, math.nan), path_redundancy=None, collisions=1.0)]
-    cell = cell_of(runs)
-    assert (cell.runs, cell.robots, cell.arrived, cell.failures, cell.collisions) == (2, 4, 3, 1, 1)
-    assert cell.per_map["path_redundancy"].used == 1 and cell.per_map["waiting_s"].estimate == 1.0
-    assert cell.arrival.estimate == 0.75
-    assert list(cells_of([*runs, run("other")])) == [("T1", "ours"), ("T1", "other")]
-    assert np.isnan(values_of(runs, "path_redundancy")).tolist() == [False, True]
+def test_groups_and_values():
+    runs = [run(seed=1, path_redundancy=None), run(), run("other")]
+    groups = grouped(runs)
+    assert list(groups) == [("T1", "ours"), ("T1", "other")]
+    assert [r.seed for r in groups["T1", "ours"]] == [0, 1]
+    assert np.isnan(values_of(groups["T1", "ours"], "path_redundancy")).tolist() == [False, True]
 
 
 def test_pairs_are_matched_by_seed():

@@ -9,14 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swarmscope.evaluation.metrics import COUNTED, METRICS
-from swarmscope.evaluation.statistics import (
-    Interval,
-    PairedDifference,
-    bootstrap_mean,
-    paired_difference,
-    wilson,
-)
+from swarmscope.evaluation import metrics
+from swarmscope.evaluation.statistics import PairedDifference, paired_difference
 
 Floats = NDArray[np.float64]
 
@@ -46,49 +40,8 @@ class Run:
     """The choices of a side that neighbours turned round (see ``cases.py``)."""
 
 
-class Cell(NamedTuple):
-    """One planner in one place, over all its runs."""
-
-    place: str
-    planner: str
-    runs: int
-    robots: int
-    arrived: int
-    failures: int
-    """Robots that did not arrive (N_a)."""
-    collisions: int
-    arrival: Interval
-    """Share of robots that arrived, Wilson."""
-    pooled: dict[str, float]
-    """Figures over all robots of all runs together: path_redundancy, path_stretch, spl."""
-    per_map: dict[str, Interval]
-    """Every metric: mean over the maps where it exists, bootstrap interval."""
-
-
-def cell_of(runs: list[Run]) -> Cell:
-    """Return the figures of the runs of one planner in one place."""
-    robots = sum(len(run.arrival_s) for run in runs)
-    arrived = sum(int(np.isfinite(run.arrival_s).sum()) for run in runs)
-    known = (metric.name for metric in (*METRICS, *COUNTED))
-    names = [name for name in known if any(run.figures.get(name) is not None for run in runs)]
-    return Cell(
-        place=runs[0].place,
-        planner=runs[0].planner,
-        runs=len(runs),
-        robots=robots,
-        arrived=arrived,
-        failures=robots - arrived,
-        collisions=int(sum(run.figures.get("collisions") or 0 for run in runs)),
-        arrival=wilson(arrived, robots),
-        pooled=pooled_figures(runs),
-        per_map={name: bootstrap_mean(values_of(runs, name)) for name in names},
-    )
-
-
 def pooled_figures(runs: Iterable[Run]) -> dict[str, float]:
     """Return path redundancy (24), stretch and SPL with sums over the robots of all runs."""
-    from swarmscope.evaluation import metrics
-
     every = list(runs)
     travelled = np.concatenate([run.travelled_m for run in every])
     shortest = np.concatenate([run.shortest_m for run in every])
@@ -105,11 +58,6 @@ def values_of(runs: Iterable[Run], metric: str) -> Floats:
     """Return one figure of every run, NaN where it has none."""
     values = (run.figures.get(metric) for run in runs)
     return np.array([np.nan if value is None else value for value in values], np.float64)
-
-
-def cells_of(runs: Iterable[Run]) -> dict[tuple[str, str], Cell]:
-    """Return the cell of every (place, planner)."""
-    return {key: cell_of(group) for key, group in grouped(runs).items()}
 
 
 def grouped(runs: Iterable[Run]) -> dict[tuple[str, str], list[Run]]:

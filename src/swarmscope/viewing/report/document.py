@@ -126,6 +126,8 @@ def _results(material: Material) -> list[Block]:
     intro += " Differences from published values are judged against the interval: green is better, red is worse."
     known = [m for m in shown if any(m in run.figures for run in material.main_runs()) or m in POOLED]
     blocks: list[Block] = [Text(intro), *(tables.metric_table(material, metric) for metric in known)]
+    if "duration_s" in known:
+        blocks.append(tables.time_table(material))
     absent = [words.in_text(metric) for metric in shown if metric not in known]
     if absent:
         blocks.append(Text(f"Not measured in these runs: {words.listed(absent)}.", "note"))

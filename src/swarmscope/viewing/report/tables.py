@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 from swarmscope.errors import UnknownNameError
-from swarmscope.evaluation.results import Run
+from swarmscope.evaluation.results import Run, TimeBudget, time_budget
 from swarmscope.evaluation.statistics import PairedDifference
 from swarmscope.evaluation.weight import NEIGHBOUR_PRINTED, SELF_PRINTED, WEIGHT_PRINTED, WeightResult
 from swarmscope.onboard.planning._contract import load_planner
@@ -199,6 +199,36 @@ def _weight_row(name: str, number: float, bounds: str, printed: float | None, us
 
 def _bounds(low: float, high: float) -> str:
     return f"[{low:.3f}, {high:.3f}]" if math.isfinite(low) and math.isfinite(high) else ""
+
+
+TIME_PARTS = {
+    "shortest_s": "shortest way at top speed",
+    "detour_s": "detours at top speed",
+    "waiting_s": "standing still",
+    "slow_s": "turning, starting, driving slower",
+    "last_s": "from the mean arrival to the last",
+    "duration_s": "last arrival",
+}
+
+
+def time_table(material: Material) -> Table:
+    """Return where the seconds of a task go, for every planner in every place."""
+    rows = [
+        _row(material, planner, [_times(material.of(place, planner)) for place in material.places])
+        for planner in material.planners
+    ]
+    caption = "Where the seconds go: the parts of the time of the last arrival, means over the maps."
+    return Table(caption, ["", *material.places], rows)
+
+
+def _times(runs: list[Run]) -> Value:
+    if not runs:
+        return [Line(NOT_RUN, "plain")]
+    budget: TimeBudget = time_budget(runs)
+    if math.isnan(budget.duration_s):
+        return [Line("nobody arrived", "plain")]
+    lines = [Line(f"{budget.duration_s:.1f} s", "main")]
+    return lines + [Line(f"{getattr(budget, k):.1f} s {w}", "sub") for k, w in TIME_PARTS.items() if k != "duration_s"]
 
 
 def needs_table(material: Material) -> Table:
