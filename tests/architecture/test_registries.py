@@ -62,3 +62,9 @@ def test_an_unknown_parameter_is_an_error_with_the_nearest_name():
 def test_parameters_take_the_declared_type():
     params = make_params(load_planner("nav-scope"), {"w_i": 0})
     assert isinstance(params.w_i, float)
+
+
+def test_no_two_planners_share_a_type_of_parameters():
+    names = [load_planner(name).Params.__name__ for name in planner_names()]
+    kinds = {load_planner(name).Params for name in planner_names()}
+    assert len(set(names)) == len(kinds)

@@ -39,7 +39,7 @@ class Params(NamedTuple):
     """A following turns back towards the target by at most this in one tick [rad]."""
     resume_m: float = 0.5
     """An obstacle met so soon after a following ended is the same one: the side stays."""
-    reopen: float = 0.6
+    reopen: float = 0.5
     """A following changes sides when the way on the other side turns off the target by this much less [rad];
     0 as printed."""
     loop_m: float = 1.0
