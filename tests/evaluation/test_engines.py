@@ -208,6 +208,19 @@ def test_engine_names(monkeypatch):
         make_engine("ray")
 
 
+def test_a_missing_library_is_noticed_before_anything_is_run(tmp_path, monkeypatch):
+    from swarmscope.onboard.planning import orca
+
+    monkeypatch.setattr(orca, "_local", threading.local())
+    monkeypatch.setitem(sys.modules, "navground", None)
+    monkeypatch.setitem(sys.modules, "navground.core", None)
+    experiment = small(planners=VALUES["planners"] | {"ORCA": {"planner": {"name": "orca"}}})
+    with Store(tmp_path / "s.sqlite") as store:
+        with pytest.raises(MissingExtraError, match=r"swarmscope\[orca\]"):
+            run_missing(experiment, store, make_engine("in-process"))
+        assert store.count() == 0
+
+
 @pytest.fixture
 def cluster():
     """A real Ray cluster of two nodes on this machine."""

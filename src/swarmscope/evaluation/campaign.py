@@ -15,6 +15,7 @@ from swarmscope.evaluation.scenario import complete
 from swarmscope.evaluation.store import Store
 from swarmscope.evaluation.warm_up import warm_up_jobs
 from swarmscope.evaluation.work import finished, make_job, unit_key, world_key
+from swarmscope.onboard.planning._contract import load_planner
 
 Keyed = tuple[Unit, str]
 Progress = Callable[[int, int, int], None]
@@ -67,7 +68,9 @@ def run_missing(
     todo = {key: unit for unit, key in wanted}  # two labels may name the same run
     if not todo:
         return state
-    _warm_up({unit.scenario.planner.name for unit in todo.values()}, engine, say)
+    planners = {unit.scenario.planner.name for unit in todo.values()}
+    _check_available(planners)
+    _warm_up(planners, engine, say)
     order = list(todo)
     random.Random(os.getpid()).shuffle(order)  # noqa: S311  not the results' order: they do not depend on it
     skipped: list[str] = []
@@ -91,6 +94,14 @@ def _jobs(order: list[str], todo: dict[str, Unit], store: Store, skipped: list[s
         scenario = todo[key].scenario
         world = world_key(scenario)
         yield make_job(key, world, complete(scenario), store.references(world))
+
+
+def _check_available(planners: set[str]) -> None:
+    """Raise a MissingExtraError before anything is run if some planner lacks its library here."""
+    for name in sorted(planners):
+        check = getattr(load_planner(name), "check_available", None)
+        if check is not None:
+            check()
 
 
 def _warm_up(planners: set[str], engine: Engine, say: Callable[[str], None] | None) -> None:

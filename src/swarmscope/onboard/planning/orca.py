@@ -144,6 +144,11 @@ def step_all(
     command_all(first, last, ranges, percepts, shared, memories, decisions, scratch, rig, params)
 
 
+def check_available() -> None:
+    """Raise a MissingExtraError when the library is not installed."""
+    _library()
+
+
 def _library() -> Any:
     """Return this thread's (segment, neighbour, behaviour) of the library."""
     found = getattr(_local, "library", None)
