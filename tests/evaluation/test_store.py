@@ -56,6 +56,8 @@ def test_export_and_plain_sql(tmp_path, answers):
         for answer in answers:
             store.add(answer)
         assert store.export("small", tmp_path / "x.csv") == 6
+        with pytest.raises(SwarmscopeError, match=r"none/x\.csv: cannot be written"):
+            store.export("small", tmp_path / "none" / "x.csv")
     rows = list(csv.DictReader((tmp_path / "x.csv").open()))
     assert {row["planner"] for row in rows} == {"alone", "Nav-SCOPE w_i=0"}
     assert float(rows[0]["spl"]) == answers[0].figures["spl"]

@@ -18,7 +18,7 @@ import json
 import os
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, Self
 
@@ -181,24 +181,19 @@ class Store:
         """Write the experiment's results as CSV, a row per run, a column per figure; return how many rows."""
         names = ("experiment", "place", "planner", "seed", "key", "digest", "git", "config", *FIGURES)
         partial = out.with_name(f".{out.name}.partial-{os.getpid()}")
-        try:
-            with self._explained():
-                rows = self._db.execute(
-                    f"SELECT {', '.join(names)} FROM results WHERE experiment = ? ORDER BY place, planner, seed",
-                    (experiment,),
-                )
-                with partial.open("w", newline="", encoding="utf-8") as file:
-                    writer = csv.writer(file)
-                    writer.writerow(names)
-                    count = 0
-                    for row in rows:
-                        writer.writerow(row)
-                        count += 1
-                    file.flush()
-                    os.fsync(file.fileno())
+        with self._explained():
+            rows = self._db.execute(
+                f"SELECT {', '.join(names)} FROM results WHERE experiment = ? ORDER BY place, planner, seed",
+                (experiment,),
+            )
+            try:
+                count = _write_csv(partial, names, rows)
                 partial.replace(out)
-        finally:
-            partial.unlink(missing_ok=True)
+            except OSError as error:
+                raise SwarmscopeError(f"{out}: cannot be written: {error.strerror or error}") from error
+            finally:
+                with suppress(OSError):
+                    partial.unlink(missing_ok=True)
         return count
 
     def check(self) -> str:
@@ -234,6 +229,20 @@ class Store:
         except OSError as error:
             why = error.strerror or str(error)
             raise SwarmscopeError(f"{self.path}: {why}; the results that are there are kept") from error
+
+
+def _write_csv(path: Path, names: Iterable[str], rows: Iterable[tuple[Any, ...]]) -> int:
+    """Write a header and the rows, synced; return how many rows."""
+    count = 0
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(names)
+        for row in rows:
+            writer.writerow(row)
+            count += 1
+        file.flush()
+        os.fsync(file.fileno())
+    return count
 
 
 def _words(error: sqlite3.OperationalError) -> str:
