@@ -1,0 +1,108 @@
+"""Obstacle maps of the unit disk: the five of the report by name, random ones, and files of users."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from swarmscope.disk.rules import Floats
+from swarmscope.errors import ConfigError, InputFileError, UnknownNameError
+
+MOST_OBSTACLES = 200
+
+
+@dataclass(frozen=True, eq=False)
+class DiskMap:
+    """A map: its name, and centre x, y and radius of each obstacle, shape (m, 3)."""
+
+    name: str
+    obstacles: Floats
+    about: str = ""
+
+    def as_dicts(self) -> list[dict[str, Any]]:
+        """Return the obstacles in the form that the report's controllers are called with."""
+        return [{"center": (float(x), float(y)), "radius": float(radius)} for x, y, radius in self.obstacles]
+
+
+def _map(name: str, about: str, *obstacles: tuple[float, float, float]) -> DiskMap:
+    return DiskMap(name, np.array(obstacles, dtype=np.float64).reshape(-1, 3), about)
+
+
+REPORT_MAPS = {
+    one.name: one
+    for one in (
+        _map("c0", "test 1: three discs", (0.0, 0.0, 0.1), (0.5, 0.2, 0.1), (-0.3, -0.3, 0.1)),
+        _map("u", "test 2: five discs that leave U-shaped bays", (0.0, 0.0, 0.1), (0.15, 0.15, 0.08),
+             (-0.15, 0.15, 0.1), (0.15, -0.15, 0.07), (-0.15, -0.15, 0.09)),
+        _map("crevice", "test 3: a gap that is too narrow", (0.5, 0.22, 0.2), (0.5, -0.22, 0.2)),
+        _map("one-disc", "test 4: robots against robots", (0.0, 0.0, 0.05)),
+        _map("minima", "test 5: four large discs round a small one", (-0.35, 0.35, 0.2), (0.35, -0.35, 0.2),
+             (0.35, 0.35, 0.2), (-0.35, -0.35, 0.2), (0.0, 0.0, 0.05)),
+    )
+}
+"""The maps of the unit-disk report, code snippets 5 to 9, in its order."""
+
+EMPTY = _map("empty", "no obstacle")
+NAMED = REPORT_MAPS | {EMPTY.name: EMPTY}
+
+
+def find_map(name: str, n: int) -> DiskMap:
+    """Return the map of that name, 'random:SEED' for n robots, or the one in that YAML file.
+
+    Errors: UnknownNameError, InputFileError, ConfigError.
+    """
+    if name in NAMED:
+        return NAMED[name]
+    if name.startswith("random:"):
+        from swarmscope.disk.random_maps import random_map
+        from swarmscope.disk.rules import scaled
+
+        return random_map(_seed(name), scaled(n)).map
+    if Path(name).suffix in {".yaml", ".yml", ".json"}:
+        return read_map(Path(name))
+    raise UnknownNameError("map", name, [*NAMED, "random:SEED", "FILE.yaml"])
+
+
+def _seed(name: str) -> int:
+    text = name.partition(":")[2]
+    if not text.isdecimal():
+        raise ConfigError(name, "the seed of a random map is a whole number, as in random:7")
+    return int(text)
+
+
+def read_map(path: Path) -> DiskMap:
+    """Return the map of a YAML file: ``obstacles``, a list of ``center: [x, y]`` and ``radius``."""
+    try:
+        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputFileError(path, error.strerror or "cannot be read") from None
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise InputFileError(path, f"is not YAML: {' '.join(str(error).split())}") from None
+    if not isinstance(content, Mapping) or set(content) - {"obstacles", "name", "about"}:
+        raise InputFileError(path, "has to hold 'obstacles' (and may hold 'name' and 'about'), nothing else")
+    entries = content.get("obstacles")
+    if not isinstance(entries, list):
+        raise InputFileError(path, "'obstacles' has to be a list")
+    rows = [_obstacle(path, k, entry) for k, entry in enumerate(entries)]
+    if len(rows) > MOST_OBSTACLES:
+        raise InputFileError(path, f"has {len(rows)} obstacles; at most {MOST_OBSTACLES}")
+    return _map(str(content.get("name") or path.stem), str(content.get("about") or ""), *rows)
+
+
+def _obstacle(path: Path, k: int, entry: Any) -> tuple[float, float, float]:
+    where = f"obstacles[{k}]"
+    if not isinstance(entry, Mapping) or set(entry) != {"center", "radius"}:
+        raise InputFileError(path, f"{where} has to hold 'center' and 'radius'")
+    try:
+        x, y = (float(part) for part in entry["center"])
+        radius = float(entry["radius"])
+    except (TypeError, ValueError):
+        raise InputFileError(path, f"{where}: 'center' has to be two numbers, 'radius' one") from None
+    if not np.isfinite([x, y, radius]).all() or radius <= 0.0:
+        raise InputFileError(path, f"{where}: numbers have to be finite and the radius above 0")
+    return x, y, radius
