@@ -23,13 +23,17 @@ def first_fault(discs: Floats, r: float, start: Floats, goal: Floats) -> str:
         if discs.size and apart.min() <= 0.0:
             robot, m = np.unravel_index(apart.argmin(), apart.shape)
             x, y, radius = discs[m]
-            return (f"robot {robot} would touch obstacle {m} (radius {radius:g} at {x:g}, {y:g}) at its {what} "
-                    f"({places[robot, 0]:.3f}, {places[robot, 1]:.3f})")
+            return (
+                f"robot {robot} would touch obstacle {m} (radius {radius:g} at {x:g}, {y:g}) at its {what} "
+                f"({places[robot, 0]:.3f}, {places[robot, 1]:.3f})"
+            )
     cost = _alone(discs, r, start, goal)
     if not np.isfinite(cost).all():
         robot = int(np.flatnonzero(~np.isfinite(cost))[0])
-        return (f"infeasible: robot {robot} of radius {r:g} has no way from ({start[robot, 0]:.3f}, "
-                f"{start[robot, 1]:.3f}) to its goal ({goal[robot, 0]:.3f}, {goal[robot, 1]:.3f})")
+        return (
+            f"infeasible: robot {robot} of radius {r:g} has no way from ({start[robot, 0]:.3f}, "
+            f"{start[robot, 1]:.3f}) to its goal ({goal[robot, 0]:.3f}, {goal[robot, 1]:.3f})"
+        )
     return ""
 
 

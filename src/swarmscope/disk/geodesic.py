@@ -69,7 +69,7 @@ def segment_is_free(ways: Ways, which: int, ax: float, ay: float, bx: float, by:
     been given a margin that is used up, can still leave.
     """
     for c in range(ways.disc_start[which], ways.disc_start[which + 1]):
-        if c == one or c == two:
+        if c in (one, two):
             continue
         x, y, rho = ways.disc[c, 0], ways.disc[c, 1], ways.disc[c, 2]
         px, py = ax - x, ay - y
@@ -85,8 +85,7 @@ def _clear_run(ways: Ways, slot: int, angle: float) -> float:
     least = TWO_PI
     for k in range(ways.block_start[slot], ways.block_start[slot + 1]):
         turn = _turn(slot, angle, ways.block_angle[k])
-        if turn < least:
-            least = turn
+        least = min(least, turn)
     return least
 
 
@@ -155,23 +154,47 @@ def look_up(ways: Ways, field: int, x: float, y: float) -> tuple[float, float, f
         if length >= least or apart == 0.0:
             continue
         for side in range(2):
-            cost, tx, ty = _by_tangent(ways, field, 2 * c + side, x, y, px / apart, py / apart, rho / apart, length)
+            cost, tx, ty = _by_tangent(
+                ways, field, 2 * c + side, x, y, px / apart, py / apart, rho / apart, length, least
+            )
             if cost < least:
                 least, dx, dy, chosen = cost, tx, ty, 2 * c + side
     return least, dx, dy, chosen
 
 
+@jit_inline
+def straight_part(ways: Ways, slot: int, x: float, y: float) -> float:
+    """Return how long the way from (x, y) stays straight that makes for ``slot``."""
+    px, py, rho = ways.disc[slot // 2, 0] - x, ways.disc[slot // 2, 1] - y, ways.disc[slot // 2, 2]
+    return math.sqrt(max(0.0, px * px + py * py - rho * rho))
+
+
 @jit_inner
 def _by_tangent(
-    ways: Ways, field: int, slot: int, x: float, y: float, px: float, py: float, sine: float, length: float
+    ways: Ways,
+    field: int,
+    slot: int,
+    x: float,
+    y: float,
+    px: float,
+    py: float,
+    sine: float,
+    length: float,
+    known: float,
 ) -> tuple[float, float, float]:
-    """Return cost and direction of the way by the tangent to ``slot``; p is the unit vector to the disc's centre."""
+    """Return cost and direction of the way by the tangent to ``slot``; p is the unit vector to the disc's centre.
+
+    Infinity for a way that is not free, or cannot be shorter than ``known``.
+    """
     sense = 1.0 if slot % 2 == 0 else -1.0
     cosine = math.sqrt(max(0.0, 1.0 - sine * sine))
     # With the disc on the left (counter-clockwise) one passes it on the right of the line to its centre.
     dx, dy = px * cosine + py * sine * sense, py * cosine - px * sine * sense
     ex, ey = x + dx * length, y + dy * length
     if ex * ex + ey * ey > 1.0 + 3.0 * ROUNDING:
+        return math.inf, dx, dy
+    gx, gy = ways.field_goal[field, 0] - ex, ways.field_goal[field, 1] - ey
+    if length + math.sqrt(gx * gx + gy * gy) >= known:
         return math.inf, dx, dy
     c = slot // 2
     if not segment_is_free(ways, ways.field_map[field], x, y, ex, ey, c, -1):
@@ -191,7 +214,7 @@ def _is_free(discs: Floats, row: Floats) -> bool:
     if max(ax * ax + ay * ay, bx * bx + by * by) > 1.0 + 3.0 * ROUNDING:
         return False
     for c in range(len(discs)):
-        if c == a or c == b:  # noqa: PLR1714
+        if c in (a, b):
             continue
         x, y = discs[c, 0], discs[c, 1]
         if nearest_on_the_way(ax - x, ay - y, bx - x, by - y) < discs[c, 2] - TOUCH:

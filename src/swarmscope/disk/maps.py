@@ -37,12 +37,26 @@ REPORT_MAPS = {
     one.name: one
     for one in (
         _map("c0", "test 1: three discs", (0.0, 0.0, 0.1), (0.5, 0.2, 0.1), (-0.3, -0.3, 0.1)),
-        _map("u", "test 2: five discs that leave U-shaped bays", (0.0, 0.0, 0.1), (0.15, 0.15, 0.08),
-             (-0.15, 0.15, 0.1), (0.15, -0.15, 0.07), (-0.15, -0.15, 0.09)),
+        _map(
+            "u",
+            "test 2: five discs that leave U-shaped bays",
+            (0.0, 0.0, 0.1),
+            (0.15, 0.15, 0.08),
+            (-0.15, 0.15, 0.1),
+            (0.15, -0.15, 0.07),
+            (-0.15, -0.15, 0.09),
+        ),
         _map("crevice", "test 3: a gap that is too narrow", (0.5, 0.22, 0.2), (0.5, -0.22, 0.2)),
         _map("one-disc", "test 4: robots against robots", (0.0, 0.0, 0.05)),
-        _map("minima", "test 5: four large discs round a small one", (-0.35, 0.35, 0.2), (0.35, -0.35, 0.2),
-             (0.35, 0.35, 0.2), (-0.35, -0.35, 0.2), (0.0, 0.0, 0.05)),
+        _map(
+            "minima",
+            "test 5: four large discs round a small one",
+            (-0.35, 0.35, 0.2),
+            (0.35, -0.35, 0.2),
+            (0.35, 0.35, 0.2),
+            (-0.35, -0.35, 0.2),
+            (0.0, 0.0, 0.05),
+        ),
     )
 }
 """The maps of the unit-disk report, code snippets 5 to 9, in its order."""

@@ -46,8 +46,10 @@ class Rules:
         if self.n > MOST_ROBOTS:
             raise ConfigError("n", f"{self.n} robots; at most {MOST_ROBOTS}")
         if self.n > 1 and 2.0 * self.r >= spacing(self.n):
-            raise ConfigError("r", f"{self.n} robots of radius {self.r:g} overlap at their starts, which are "
-                              f"{spacing(self.n):.4g} apart")
+            raise ConfigError(
+                "r",
+                f"{self.n} robots of radius {self.r:g} overlap at their starts, which are {spacing(self.n):.4g} apart",
+            )
         if self.step >= self.r:
             raise ConfigError("v_max", f"a step of dt v_max = {self.step:g} is not small against the radius {self.r:g}")
 
@@ -115,6 +117,9 @@ def read_permutation(text: str, n: int) -> tuple[int, ...]:
     except ValueError:
         found = ()
     if sorted(found) != list(range(n)):
-        raise ConfigError("permutation", f"'{text}' does not name each of 0 to {n - 1} once, as in "
-                          f"{','.join(str(k) for k in range(n)) if n <= 12 else '0,1,2,...'}")
+        raise ConfigError(
+            "permutation",
+            f"'{text}' does not name each of 0 to {n - 1} once, as in "
+            f"{','.join(str(k) for k in range(n)) if n <= 12 else '0,1,2,...'}",
+        )
     return found

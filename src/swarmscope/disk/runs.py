@@ -21,7 +21,12 @@ from swarmscope.disk.rules import ROUNDING, Floats, Ints, Rules, goals, starts
 
 GOING, ARRIVED, HIT_ROBOT, HIT_OBSTACLE, LEFT_DISK, TIMED_OUT, INVALID = range(7)
 STATUS_WORDS = (
-    "still going", "arrived", "robots collided", "hit an obstacle", "left the disk", "ran out of steps",
+    "still going",
+    "arrived",
+    "robots collided",
+    "hit an obstacle",
+    "left the disk",
+    "ran out of steps",
     "got no valid velocity",
 )
 COLLISIONS = (HIT_ROBOT, HIT_OBSTACLE, LEFT_DISK)

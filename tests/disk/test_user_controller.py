@@ -1,0 +1,87 @@
+"""Users' files: what is told when they are wrong, and that they are run as they should."""
+
+import numpy as np
+import pytest
+
+from swarmscope.disk import maps, rules, runs, user
+from swarmscope.errors import InputFileError
+
+
+def write(tmp_path, body):
+    file = tmp_path / "mine.py"
+    file.write_text(body)
+    return file
+
+
+def function(body):
+    return f"import numpy as np\ndef compute_gradients(state, targets, obstacles, r):\n    {body}\n"
+
+
+def play(file, permutations=((0, 1),), **changes):
+    of = runs.problem(rules.Rules(n=2, max_steps=50, **changes), [maps.NAMED["one-disc"]], permutations)
+    return runs.play(of, user.UserController(file, of))
+
+
+def test_a_good_file_moves_the_robots(tmp_path):
+    outcome = play(write(tmp_path, function("return targets - state")))
+    assert outcome.length[0] == pytest.approx([50 * 0.00025] * 2)
+
+
+def test_lists_are_as_good_as_arrays(tmp_path):
+    outcome = play(write(tmp_path, function("return [[-1, 0], [0, -1]]")))
+    assert outcome.length[0] == pytest.approx([50 * 0.00025] * 2)
+
+
+@pytest.mark.parametrize(
+    ("body", "why"),
+    [
+        ("return state[0]", r"returned an array of shape \(2,\), wanted \(2, 2\)"),
+        ("return None", r"returned nothing \(None\)"),
+        ("return [[1, 2], [3]]", "returned an array of shape"),
+        ("return [['a', 'b'], ['c', 'd']]", "wanted numbers"),
+        ("return state * np.nan", r"velocity of robot 0 is \[nan, nan\]"),
+        ("return 1 / 0", "raised ZeroDivisionError in line 3: division by zero"),
+        ("return state + 1j", "wanted numbers"),
+    ],
+)
+def test_wrong_answers_are_told_with_step_map_and_permutation(tmp_path, body, why):
+    with pytest.raises(user.UserControllerError, match=why) as told:
+        play(write(tmp_path, function(body)))
+    assert "step 0 of map one-disc, permutation 0,1" in str(told.value)
+
+
+@pytest.mark.parametrize(
+    ("body", "why"),
+    [
+        ("x = 1", "has no function compute_gradients"),
+        ("compute_gradients = 3", "has no function"),
+        ("def compute_gradients(state): return state", "cannot be called as"),
+        ("def compute_gradients(:", "is not Python: line 1"),
+        ("import nothing_of_that_name", "raised ModuleNotFoundError in line 1"),
+        ("\0", "is not Python"),
+    ],
+)
+def test_files_that_cannot_be_used_are_told(tmp_path, body, why):
+    with pytest.raises(InputFileError, match=why):
+        play(write(tmp_path, body))
+
+
+def test_a_missing_file_is_told(tmp_path):
+    with pytest.raises(InputFileError, match="No such file"):
+        user.compiled(tmp_path / "none.py")
+
+
+def test_what_a_file_keeps_does_not_leak_between_runs_nor_into_the_simulator(tmp_path):
+    body = "calls = 0\n" + function(
+        "global calls; calls += 1; state[:] = 9; obstacles.clear(); return [[-calls / 1e3] * 2] * 2"
+    )
+    outcome = play(write(tmp_path, body), [(0, 1), (1, 0)])
+    assert outcome.length[0] == pytest.approx(outcome.length[1])
+    assert outcome.length[0, 0] == pytest.approx(sum(range(1, 51)) / 1e3 * 0.00025 * np.sqrt(2))
+
+
+def test_the_starter_works_and_is_not_overwritten(tmp_path):
+    file = user.write_starter(tmp_path / "first.py")
+    assert np.isfinite(play(file).length).all()
+    with pytest.raises(InputFileError, match="is there already"):
+        user.write_starter(file)
