@@ -56,9 +56,9 @@ def problem(*obstacles, **changes):
 
 
 def test_obstacles_on_starts_and_goals_are_refused():
-    with pytest.raises(UnsolvableWorldError, match="robot 0 would touch obstacle 0 .* at its start"):
+    with pytest.raises(UnsolvableWorldError, match=r"robot 0 would touch obstacle 0 .* at its start"):
         check.check(problem((0.9, 0.0, 0.1)))
-    with pytest.raises(UnsolvableWorldError, match="robot 0 would touch obstacle 0 .* at its goal"):
+    with pytest.raises(UnsolvableWorldError, match=r"robot 0 would touch obstacle 0 .* at its goal"):
         check.check(problem((-0.9, 0.0, 0.1)))
 
 

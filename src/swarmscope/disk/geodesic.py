@@ -122,7 +122,7 @@ def _along_slot(ways: Ways, field: int, slot: int, angle: float) -> float:
 def _next_node(ways: Ways, slot: int, angle: float) -> int:
     """Return the first node at or after ``angle`` in the sense of travel."""
     first, end = ways.slot_start[slot], ways.slot_start[slot + 1]
-    best, least = first, math.inf
+    best, least = int(first), math.inf
     for k in range(first, end):
         turn = _turn(slot, angle, ways.node_angle[k])
         if turn < least:

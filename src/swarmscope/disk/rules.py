@@ -99,7 +99,8 @@ def goals(permutation: Sequence[int]) -> Floats:
 
 
 def _on_circle(radius: float, angles: Floats) -> Floats:
-    return radius * np.column_stack([np.cos(angles), np.sin(angles)])
+    places: Floats = radius * np.column_stack([np.cos(angles), np.sin(angles)])
+    return places
 
 
 def all_permutations(n: int) -> Iterator[tuple[int, ...]]:

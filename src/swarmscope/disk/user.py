@@ -98,7 +98,8 @@ class UserController:
         if not np.isfinite(numbers).all():
             robot = int(np.flatnonzero(~np.isfinite(numbers).all(axis=1))[0])
             raise UserControllerError(
-                f"{self._where(b, step)}: the velocity of robot {robot} is {numbers[robot].tolist()}, wanted finite numbers"
+                f"{self._where(b, step)}: the velocity of robot {robot} is {numbers[robot].tolist()}, "
+                "wanted finite numbers"
             )
         return numbers
 
@@ -127,8 +128,8 @@ def function_of(path: Path, code: CodeType) -> Callable[..., Any]:
         exec(code, space)  # noqa: S102 - running the user's own file is what the user asked for
     except Exception as error:
         raise InputFileError(path, raised(error, path)) from None
-    function = space.get(FUNCTION)
-    if not callable(function):
+    function: Callable[..., Any] | None = space.get(FUNCTION)
+    if function is None or not callable(function):
         raise InputFileError(path, f"has no function {SIGNATURE}")
     try:
         inspect.signature(function).bind(None, None, None, None)

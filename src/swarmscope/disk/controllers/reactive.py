@@ -244,9 +244,8 @@ def free_run(x: float, y: float, vx: float, vy: float) -> float:
 @jit_inner
 def _goes_first(b: int, i: int, j: int, memory: Memory) -> bool:
     """Return whether robot j goes before robot i."""
-    if memory.rank[b, i] != memory.rank[b, j]:
-        return memory.rank[b, i] < memory.rank[b, j]
-    return j < i
+    mine, other = memory.rank[b, i], memory.rank[b, j]
+    return bool(mine < other or (mine == other and j < i))
 
 
 @jit_inner
@@ -365,7 +364,7 @@ def _decide(
         # Nobody who travels on for so long can be nearer to the goal than this: the cost is looked up when it matters.
         memory.cost[k], memory.known[k] = menu[k, 2] + length - menu[k, 1] * menu[k, 2], 0
     while True:
-        k = np.argmin(memory.cost)
+        k = int(np.argmin(memory.cost))
         if memory.cost[k] >= best:
             return acts
         turn, speed, time = menu[k, 0], menu[k, 1], menu[k, 2]
