@@ -95,7 +95,8 @@ def goal_places(n: int) -> Floats:
 
 def goals(permutation: Sequence[int]) -> Floats:
     """Return the goal of each robot (n, 2): robot k goes to place ``permutation[k]``."""
-    return goal_places(len(permutation))[np.asarray(permutation)]
+    places: Floats = goal_places(len(permutation))[np.asarray(permutation)]
+    return places
 
 
 def _on_circle(radius: float, angles: Floats) -> Floats:
