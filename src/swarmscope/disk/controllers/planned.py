@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from swarmscope._jit import jit
-from swarmscope.disk.controllers import _paths, _schedule
+from swarmscope.disk.controllers import _elastic, _paths, _schedule
 from swarmscope.disk.rules import Floats, Ints, Rules, goal_places, starts
 from swarmscope.disk.runs import ARRIVED, COLLISIONS, Problem, play
 
@@ -19,6 +19,8 @@ GUARANTEES = ("no collision: plans are played before they are used, and robots w
 
 SAG = 0.008
 """Largest distance between an arc and the chord of one tick, as a part of a robot's radius."""
+PIECE = 0.5
+"""Way between two points of a relaxed plan, as a part of the radius."""
 HAIR = 2e-5
 """Gap to obstacles that plans keep apart from that, and to robots, but for ``robot_gap``."""
 
@@ -30,8 +32,19 @@ class Params(NamedTuple):
     """Attempts to improve the first plan; fewer for more than 20 robots."""
     robot_gap: float = 0.002
     """Gap between robots, as a part of the radius."""
+    sweeps: int = 1000
+    """Of the relaxation of plans that are longer than the bound."""
     tick: int = 32
     """Most steps between two points of a plan."""
+
+
+class Schedule(NamedTuple):
+    """The plan of a run: where everybody is at some times; between them all move straight."""
+
+    point: list[Floats]
+    """Of each robot (times, 2); who has arrived has no more."""
+    time: Floats
+    """Steps from the start, increasing."""
 
 
 class Tracks(NamedTuple):
@@ -43,10 +56,12 @@ class Tracks(NamedTuple):
     """(runs, n): where a robot's begin."""
     count: Ints
     """(runs, n)."""
+    time: Floats
+    """(times,): those of all runs."""
     first: Ints
-    """(runs,): steps of the first tick."""
-    tick: Ints
-    """(runs,): steps of the others."""
+    """(runs + 1,): where those of a run begin."""
+    now: Ints
+    """(runs,): which was needed last."""
 
 
 class PlannedController:
@@ -57,19 +72,22 @@ class PlannedController:
 
     def velocities(self, step: int, alive: Ints, state: Floats, velocity: Floats, out: Floats) -> None:
         """Write the velocities (see ``Controller``)."""
-        _velocities(step, alive, state, self._stride, self._tracks, out)
+        if step == 0:
+            self._tracks.now[:] = 0
+        _velocities(step + 1.0, alive, state, self._stride, self._tracks, out)
 
 
 @jit
-def _velocities(step: int, alive: Ints, state: Floats, stride: float, tracks: Tracks, out: Floats) -> None:
+def _velocities(time: float, alive: Ints, state: Floats, stride: float, tracks: Tracks, out: Floats) -> None:
     for b in alive:
-        first, tick = tracks.first[b], tracks.tick[b]
-        after = step + 1
-        if after <= first:
-            k, part = 0, after / first
-        else:
-            k = 1 + (after - first - 1) // tick
-            part = (after - first - (k - 1) * tick) / tick
+        first, most = tracks.first[b], tracks.first[b + 1] - tracks.first[b] - 1
+        k = tracks.now[b]
+        while k < most and tracks.time[first + k + 1] < time:
+            k += 1
+        tracks.now[b] = k
+        part = 0.0
+        if k < most:
+            part = (time - tracks.time[first + k]) / (tracks.time[first + k + 1] - tracks.time[first + k])
         for i in range(state.shape[1]):
             begin, last = tracks.begin[b, i], tracks.count[b, i] - 1
             one, two = begin + min(k, last), begin + min(k + 1, last)
@@ -87,7 +105,7 @@ def tick_steps(rules: Rules, discs: Floats, most: int) -> int:
 
 def create(problem: Problem, params: Params) -> PlannedController:
     """Return the controller of these runs, with all plans made and played once."""
-    plans: list[tuple[list[Floats], int, int]] = []
+    plans: list[Schedule] = []
     terrains: dict[int, tuple[_paths.Terrain, dict[tuple[int, int], list[Floats]], int]] = {}
     for b, which in enumerate(problem.map_of.tolist()):
         if which not in terrains:
@@ -119,8 +137,8 @@ def _plan(
     b: int,
     prepared: tuple[_paths.Terrain, dict[tuple[int, int], list[Floats]], int],
     params: Params,
-) -> tuple[list[Floats], int, int]:
-    """Return points of each robot of a run, and the steps of the first and of the other ticks."""
+) -> Schedule:
+    """Return the plan of a run."""
     on, known, tick = prepared
     rules, pairs = problem.rules, list(enumerate(problem.permutation[b].tolist()))
     for pair in pairs:
@@ -136,7 +154,36 @@ def _plan(
     plan, work = _schedule.room_for(case, ticks, b)
     order = np.array(sorted(range(rules.n), key=lambda i: -case.count[i, 0]), dtype=np.int64)
     _schedule.search(case, plan, work, order, params.iterations)
-    return [plan.track[i, : plan.last[i] + 1].copy() for i in range(rules.n)], first, tick
+    time = np.concatenate([[0.0], first + tick * np.arange(ticks - 1.0)])
+    if params.sweeps and plan.arrival.max() < _schedule.NEVER and plan.last.max() > case.least:
+        better = _relaxed(plan, time, case, on, longest, problem, b, params)
+        if better is not None:
+            return better
+    return Schedule([plan.track[i, : plan.last[i] + 1].copy() for i in range(rules.n)], time[: plan.last.max() + 1])
+
+
+def _relaxed(
+    plan: _schedule.Plan,
+    time: Floats,
+    case: _schedule.Case,
+    on: _paths.Terrain,
+    longest: float,
+    problem: Problem,
+    b: int,
+    params: Params,
+) -> Schedule | None:
+    """Return the plan with all its ways relaxed, None if that did not make it shorter."""
+    rules = problem.rules
+    count = 2 + int(time[plan.last.max()] * rules.step / (PIECE * rules.r))
+    point = _elastic.resampled(plan.track, plan.last, time, count)
+    over = 0.002 * rules.r
+    bands = _elastic.Bands(point, problem.goal[b], on.discs, rules.tol - 1e-7, rules.r, case.apart, HAIR, over)
+    best, length = _elastic.relax(bands, longest, params.sweeps)
+    if not math.ceil(length / rules.step) < time[plan.last.max()]:
+        return None
+    pieces = np.linalg.norm(np.diff(best, axis=1), axis=2).max(axis=0) / rules.step * (1.0 + 1e-9)
+    moving = np.concatenate([[True], pieces > 1e-6])
+    return Schedule(list(best[:, moving]), np.concatenate([[0.0], np.cumsum(pieces)])[moving])
 
 
 def _case(
@@ -166,13 +213,14 @@ def _case(
     return _schedule.Case(place, count, (2.0 + params.robot_gap) * rules.r + HAIR, pace * (1.0 + 1e-9), least)
 
 
-def _packed(plans: list[tuple[list[Floats], int, int]], n: int) -> Tracks:
-    count = np.array([[len(points) for points in run] for run, _, _ in plans], dtype=np.int64).reshape(-1, n)
+def _packed(plans: list[Schedule], n: int) -> Tracks:
+    count = np.array([[len(points) for points in plan.point] for plan in plans], dtype=np.int64).reshape(-1, n)
     ends = np.cumsum(count.ravel())
     return Tracks(
-        position=np.concatenate([np.empty((0, 2)), *(points for run, _, _ in plans for points in run)]),
+        position=np.concatenate([np.empty((0, 2)), *(points for plan in plans for points in plan.point)]),
         begin=(ends - count.ravel()).reshape(count.shape),
         count=count,
-        first=np.array([first for _, first, _ in plans], dtype=np.int64),
-        tick=np.array([tick for _, _, tick in plans], dtype=np.int64),
+        time=np.concatenate([np.empty(0), *(plan.time for plan in plans)]),
+        first=np.cumsum([0, *(len(plan.time) for plan in plans)]),
+        now=np.zeros(len(plans), dtype=np.int64),
     )
