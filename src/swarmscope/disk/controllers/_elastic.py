@@ -12,6 +12,7 @@ longer than the least known time allows, then robots and obstacles push away wha
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -52,13 +53,13 @@ class Near(NamedTuple):
     """(room, 3): robot, obstacle, time."""
 
 
-def resampled(track: Floats, last: Ints, times: Floats, count: int) -> Floats:
-    """Return the points (n, count, 2) of tracks (n, ticks, 2), whose ticks are at ``times``, at equal times."""
-    wanted = np.linspace(0.0, times[int(last.max())], count)
-    out = np.empty((len(track), count, 2))
-    for i, end in enumerate(last):
+def resampled(tracks: Sequence[Floats], times: Floats, count: int) -> Floats:
+    """Return the points (n, count, 2) at equal times of tracks (ticks, 2) at ``times``; who has arrived stays."""
+    wanted = np.linspace(0.0, times[-1], count)
+    out = np.empty((len(tracks), count, 2))
+    for i, track in enumerate(tracks):
         for axis in range(2):
-            out[i, :, axis] = np.interp(wanted, times[: end + 1], track[i, : end + 1, axis])
+            out[i, :, axis] = np.interp(wanted, times[: len(track)], track[:, axis])
     return out
 
 

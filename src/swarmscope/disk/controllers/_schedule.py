@@ -64,7 +64,7 @@ class Work(NamedTuple):
     """(1,): state of the random numbers."""
 
 
-def room_for(case: Case, ticks: int, seed: int) -> tuple[Plan, Work]:
+def room_for(case: Case, ticks: int) -> tuple[Plan, Work]:
     """Return an empty plan and room to work in."""
     n, ways, most = case.place.shape[:3]
     plan = Plan(np.zeros((n, ticks, 2)), np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64))
@@ -76,7 +76,7 @@ def room_for(case: Case, ticks: int, seed: int) -> tuple[Plan, Work]:
         old_track=np.zeros((n, ticks, 2)),
         old_last=np.zeros(n, dtype=np.int64),
         old_arrival=np.zeros(n, dtype=np.int64),
-        random=np.array([seed * 2 + 1], dtype=np.uint64),
+        random=np.ones(1, dtype=np.uint64),
     )
     return plan, work
 
@@ -240,22 +240,19 @@ def _cost(case: Case, plan: Plan) -> int:
 
 
 @jit
-def search(case: Case, plan: Plan, work: Work, order: Ints, iterations: int) -> int:
-    """Plan all robots in an order, then improve the plan; return how many robots have none."""
+def search(case: Case, plan: Plan, work: Work, order: Ints, iterations: int, seed: int) -> None:
+    """Plan all robots in an order, then improve the plan."""
     n = len(order)
+    work.random[0] = np.uint64(seed * 7919 + 88172645463325252)
     for i in range(n):
         forget(case, plan, i)
     for i in order:
-        replan(case, plan, work, i, case.least if n <= 0 else 0, False)
+        replan(case, plan, work, i, 0, False)
     cost = _cost(case, plan)
     for _ in range(iterations):
         if cost == 0:
             break
         cost = _improve(case, plan, work, cost)
-    lost = 0
-    for i in range(n):
-        lost += plan.arrival[i] == NEVER
-    return lost
 
 
 @jit

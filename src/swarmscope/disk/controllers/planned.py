@@ -19,7 +19,7 @@ GUARANTEES = ("no collision: plans are played before they are used, and robots w
 
 SAG = 0.008
 """Largest distance between an arc and the chord of one tick, as a part of a robot's radius."""
-PIECE = 0.5
+PIECE = 1.0
 """Way between two points of a relaxed plan, as a part of the radius."""
 HAIR = 2e-5
 """Gap to obstacles that plans keep apart from that, and to robots, but for ``robot_gap``."""
@@ -28,12 +28,16 @@ HAIR = 2e-5
 class Params(NamedTuple):
     """Numbers of the planned controller."""
 
-    iterations: int = 400
-    """Attempts to improve the first plan; fewer for more than 20 robots."""
+    attempts: int = 4
+    """Plans made independently of each other; the best is used."""
+    iterations: int = 200
+    """Improvements tried of each; fewer for more than 20 robots."""
     robot_gap: float = 0.002
     """Gap between robots, as a part of the radius."""
-    sweeps: int = 1000
-    """Of the relaxation of plans that are longer than the bound."""
+    sweeps: int = 1500
+    """Of the relaxation of plans that are longer than the bound ..."""
+    finish: int = 6000
+    """... and of that of the best of them."""
     tick: int = 32
     """Most steps between two points of a plan."""
 
@@ -151,39 +155,46 @@ def _plan(
     first = (steps - 1) % tick + 1
     case = _case(ways, lengths, on, first, tick, steps, rules, params)
     ticks = (rules.max_steps - first) // tick + 1
-    plan, work = _schedule.room_for(case, ticks, b)
-    order = np.array(sorted(range(rules.n), key=lambda i: -case.count[i, 0]), dtype=np.int64)
-    _schedule.search(case, plan, work, order, params.iterations)
     time = np.concatenate([[0.0], first + tick * np.arange(ticks - 1.0)])
-    if params.sweeps and plan.arrival.max() < _schedule.NEVER and plan.last.max() > case.least:
-        better = _relaxed(plan, time, case, on, longest, problem, b, params)
-        if better is not None:
-            return better
-    return Schedule([plan.track[i, : plan.last[i] + 1].copy() for i in range(rules.n)], time[: plan.last.max() + 1])
+    plan, work = _schedule.room_for(case, ticks)
+    longest_first = sorted(range(rules.n), key=lambda i: -case.count[i, 0])
+    best, bands = None, _bands(on, problem.goal[b], rules, case)
+    for attempt in range(max(1, params.attempts)):
+        if attempt == 0:
+            order = np.array(longest_first, dtype=np.int64)
+        else:
+            order = np.random.default_rng(attempt).permutation(rules.n)
+        _schedule.search(case, plan, work, order, params.iterations, attempt)
+        found = Schedule(
+            [plan.track[i, : plan.last[i] + 1].copy() for i in range(rules.n)], time[: plan.last.max() + 1]
+        )
+        lost = int(np.count_nonzero(plan.arrival == _schedule.NEVER))
+        if lost == 0 and plan.last.max() <= case.least:
+            return found
+        if lost == 0 and params.sweeps:
+            found = _relaxed(found, bands, longest, rules, params.sweeps)
+        if best is None or (lost, found.time[-1]) < best[:2]:
+            best = lost, float(found.time[-1]), found
+    assert best is not None
+    return best[2] if best[0] or not params.finish else _relaxed(best[2], bands, longest, rules, params.finish)
 
 
-def _relaxed(
-    plan: _schedule.Plan,
-    time: Floats,
-    case: _schedule.Case,
-    on: _paths.Terrain,
-    longest: float,
-    problem: Problem,
-    b: int,
-    params: Params,
-) -> Schedule | None:
-    """Return the plan with all its ways relaxed, None if that did not make it shorter."""
-    rules = problem.rules
-    count = 2 + int(time[plan.last.max()] * rules.step / (PIECE * rules.r))
-    point = _elastic.resampled(plan.track, plan.last, time, count)
+def _bands(on: _paths.Terrain, goal: Floats, rules: Rules, case: _schedule.Case) -> _elastic.Bands:
+    point = np.empty((rules.n, 0, 2))
     over = 0.002 * rules.r
-    bands = _elastic.Bands(point, problem.goal[b], on.discs, rules.tol - 1e-7, rules.r, case.apart, HAIR, over)
-    best, length = _elastic.relax(bands, longest, params.sweeps)
-    if not math.ceil(length / rules.step) < time[plan.last.max()]:
-        return None
-    pieces = np.linalg.norm(np.diff(best, axis=1), axis=2).max(axis=0) / rules.step * (1.0 + 1e-9)
+    return _elastic.Bands(point, goal, on.discs, rules.tol - 1e-7, rules.r, case.apart, HAIR, over)
+
+
+def _relaxed(plan: Schedule, bands: _elastic.Bands, longest: float, rules: Rules, sweeps: int) -> Schedule:
+    """Return the plan with all its ways relaxed, or the plan itself if that did not make it shorter."""
+    count = 2 + int(plan.time[-1] * rules.step / (PIECE * rules.r))
+    point = _elastic.resampled(plan.point, plan.time, count)
+    point, length = _elastic.relax(bands._replace(point=point), longest, sweeps)
+    if not length / rules.step < plan.time[-1]:
+        return plan
+    pieces = np.linalg.norm(np.diff(point, axis=1), axis=2).max(axis=0) / rules.step * (1.0 + 1e-9)
     moving = np.concatenate([[True], pieces > 1e-6])
-    return Schedule(list(best[:, moving]), np.concatenate([[0.0], np.cumsum(pieces)])[moving])
+    return Schedule(list(point[:, moving]), np.concatenate([[0.0], np.cumsum(pieces)])[moving])
 
 
 def _case(
