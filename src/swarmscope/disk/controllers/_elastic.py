@@ -23,6 +23,8 @@ from swarmscope.disk.rules import Floats, Ints
 
 LISTED_FOR = 25
 """Sweeps for which a list of who is near whom is used."""
+PATIENCE, WORTH = 500, 1e-4
+"""A plan that has not become shorter by that part in so many sweeps is left as it is."""
 
 
 class Bands(NamedTuple):
@@ -72,7 +74,7 @@ def relax(bands: Bands, longest: float, sweeps: int) -> tuple[Floats, float]:
         sweeps: how many.
     """
     n, times = bands.point.shape[:2]
-    room = 40 * n * times
+    room = 12 * n * times
     near = Near(np.empty((room, 3), dtype=np.int64), np.empty((room, 3), dtype=np.int64))
     best = bands.point.copy()
     length = _relax(bands, near, longest / (times - 1), sweeps, best)
@@ -81,7 +83,7 @@ def relax(bands: Bands, longest: float, sweeps: int) -> tuple[Floats, float]:
 
 @jit
 def _relax(bands: Bands, near: Near, piece: float, sweeps: int, best: Floats) -> float:
-    least = math.inf
+    least = before = math.inf
     robots = discs = 0
     for sweep in range(sweeps):
         if sweep % LISTED_FOR == 0:
@@ -99,6 +101,10 @@ def _relax(bands: Bands, near: Near, piece: float, sweeps: int, best: Floats) ->
                         best[i, k, 0], best[i, k, 1] = bands.point[i, k, 0], bands.point[i, k, 1]
             if least <= piece * (best.shape[1] - 1):
                 break
+        if sweep % PATIENCE == PATIENCE - 1:
+            if least > before * (1.0 - WORTH):
+                break
+            before = least
     return least
 
 
@@ -122,9 +128,8 @@ def is_free(bands: Bands) -> bool:
     for i in range(n):
         for k in range(times):
             x, y = point[i, k, 0], point[i, k, 1]
-            if x * x + y * y > 1.0:
-                if k > 0:
-                    return False
+            if k > 0 and x * x + y * y > 1.0:
+                return False
             if k + 1 == times:
                 gx, gy = x - bands.goal[i, 0], y - bands.goal[i, 1]
                 if gx * gx + gy * gy > bands.tol * bands.tol:

@@ -47,7 +47,9 @@ class Terrain(NamedTuple):
     """Largest distance of vertices on arcs."""
 
 
-def terrain(discs: Floats, r: float, start: Floats, goal: Floats, clear: float, apart: float, spacing: float) -> Terrain:
+def terrain(
+    discs: Floats, r: float, start: Floats, goal: Floats, clear: float, apart: float, spacing: float
+) -> Terrain:
     """Return the ways of a map.
 
     Args:
@@ -64,7 +66,10 @@ def terrain(discs: Floats, r: float, start: Floats, goal: Floats, clear: float, 
         p * (1.0 - (apart + 3.0 * sag) / np.linalg.norm(p, axis=1))[:, None] for p in (start, goal)
     )
     ends = np.concatenate([start, goal])
-    parked = np.column_stack([ends, np.full(2 * n, apart + sag - r - clear)])
+    # Ways between inner points bend outwards round obstacles only, so only places near those have to be kept free.
+    near = np.linalg.norm(ends[:, None] - discs[None, :, :2], axis=2) < discs[:, 2] + apart + 5.0 * r
+    crossed = ends[near.any(axis=1)]
+    parked = np.column_stack([crossed, np.full(len(crossed), apart + sag - r - clear)])
     here = np.zeros(2 * n, dtype=np.int64)
     open_ways = geodesic.add_goals(geodesic.build([discs], r + clear), here, ends)
     kept = geodesic.build([np.concatenate([discs.reshape(-1, 3), parked])], r + clear)

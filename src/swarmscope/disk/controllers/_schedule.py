@@ -25,7 +25,7 @@ class Case(NamedTuple):
 
     place: Floats
     """(n, ways, places, 2)."""
-    count: Ints
+    used: Ints
     """(n, ways): places in use, increasing; 0 for no way."""
     apart: float
     """Least distance between two robots."""
@@ -143,7 +143,7 @@ def least_delay(case: Case, plan: Plan, work: Work, robot: int, way: int, most: 
 
     Row d of ``work.reach`` says for each place whether one can be there d ticks later than at full speed.
     """
-    count = case.count[robot, way]
+    count = case.used[robot, way]
     place = case.place[robot, way]
     stay = free_from(case, plan, robot, place[count - 1, 0], place[count - 1, 1])
     most = min(most, len(work.reach) - 1, plan.track.shape[1] - count)
@@ -178,7 +178,7 @@ def least_delay(case: Case, plan: Plan, work: Work, robot: int, way: int, most: 
 @jit
 def write_track(case: Case, plan: Plan, work: Work, robot: int, way: int, delay: int) -> None:
     """Note the way just found by ``least_delay`` as the plan of a robot."""
-    k, d = case.count[robot, way] - 1, delay
+    k, d = case.used[robot, way] - 1, delay
     plan.last[robot] = plan.arrival[robot] = k + d
     while True:
         plan.track[robot, k + d, 0] = case.place[robot, way, k, 0]
@@ -199,22 +199,25 @@ def forget(case: Case, plan: Plan, robot: int) -> None:
 
 
 @jit
-def replan(case: Case, plan: Plan, work: Work, robot: int, target: int, shuffled: bool) -> None:
-    """Give a robot the plan that arrives first, or any by ``target``; shorter ways are tried first unless shuffled."""
+def replan(case: Case, plan: Plan, work: Work, robot: int, target: int, cap: int, shuffled: bool) -> bool:
+    """Give a robot the plan that arrives first, or any by ``target``; shorter ways are tried first unless shuffled.
+
+    Returns whether there is one that arrives by ``cap``.
+    """
     ways = 0
-    while ways < case.count.shape[1] and case.count[robot, ways] > 0:
+    while ways < case.used.shape[1] and case.used[robot, ways] > 0:
         work.ways[ways] = ways
         ways += 1
     if shuffled:
         for k in range(ways - 1, 0, -1):
             other = _random(work, k + 1)
             work.ways[k], work.ways[other] = work.ways[other], work.ways[k]
-    best = NEVER
+    best = cap + 1
     # First what arrives in time, then, if nothing does, what arrives first.
     for late in range(2):
         for k in range(ways):
             way = work.ways[k] if late == 0 else k
-            full = case.count[robot, way] - 1
+            full = case.used[robot, way] - 1
             most = (target if late == 0 else best - 1) - full
             if most < 0:
                 continue
@@ -223,9 +226,8 @@ def replan(case: Case, plan: Plan, work: Work, robot: int, target: int, shuffled
                 best = full + delay
                 write_track(case, plan, work, robot, way, delay)
                 if late == 0:
-                    return
-        if best < NEVER:
-            return
+                    return True
+    return best <= cap
 
 
 @jit
@@ -247,7 +249,7 @@ def search(case: Case, plan: Plan, work: Work, order: Ints, iterations: int, see
     for i in range(n):
         forget(case, plan, i)
     for i in order:
-        replan(case, plan, work, i, 0, False)
+        replan(case, plan, work, i, 0, NEVER - 1, False)
     cost = _cost(case, plan)
     for _ in range(iterations):
         if cost == 0:
@@ -259,9 +261,11 @@ def search(case: Case, plan: Plan, work: Work, order: Ints, iterations: int, see
 def _improve(case: Case, plan: Plan, work: Work, cost: int) -> int:
     """Plan a late robot and some others anew; keep that if it is not worse. Return the cost."""
     n = len(plan.last)
-    late = 0
+    late, cap = 0, 0
     for i in range(n):
         late += plan.arrival[i] > case.least
+        cap = max(cap, plan.arrival[i])
+    cap = min(cap, NEVER - 1)
     chosen = _random(work, late)
     first = 0
     for i in range(n):
@@ -281,11 +285,13 @@ def _improve(case: Case, plan: Plan, work: Work, cost: int) -> int:
         other = _random(work, taken)
         work.order[0], work.order[other] = work.order[other], work.order[0]
     shuffled = _random(work, 4) > 0
+    good = True
     for k in range(taken):
-        replan(case, plan, work, work.order[k], case.least, shuffled)
-    found = _cost(case, plan)
-    if found <= cost:
-        return found
+        good = good and replan(case, plan, work, work.order[k], case.least, cap, shuffled)
+    if good:
+        found = _cost(case, plan)
+        if found <= cost:
+            return found
     for k in range(taken):
         i = work.order[k]
         plan.last[i], plan.arrival[i] = work.old_last[i], work.old_arrival[i]
@@ -307,7 +313,7 @@ def _neighbours(case: Case, plan: Plan, work: Work, first: int) -> int:
     taken = 1
     if _random(work, 2) == 0:
         ways = 0
-        while ways < min(8, case.count.shape[1]) and case.count[first, ways] > 0:
+        while ways < min(8, case.used.shape[1]) and case.used[first, ways] > 0:
             ways += 1
         way = _random(work, ways)
         for k in range(1, n):
@@ -331,7 +337,7 @@ def _meets(case: Case, plan: Plan, robot: int, way: int, other: int) -> bool:
     """Return whether a robot at full speed on one of its ways would touch another."""
     place, last = case.place[robot, way], plan.last[other]
     t = 1
-    while t < case.count[robot, way]:
+    while t < case.used[robot, way]:
         qx = place[t, 0] - plan.track[other, min(t, last), 0]
         qy = place[t, 1] - plan.track[other, min(t, last), 1]
         px = place[t - 1, 0] - plan.track[other, min(t - 1, last), 0]

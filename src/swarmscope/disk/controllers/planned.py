@@ -10,7 +10,7 @@ import numpy as np
 from swarmscope._jit import jit
 from swarmscope.disk.controllers import _elastic, _paths, _schedule
 from swarmscope.disk.rules import Floats, Ints, Rules, goal_places, starts
-from swarmscope.disk.runs import ARRIVED, COLLISIONS, Problem, play
+from swarmscope.disk.runs import COLLISIONS, Problem, play
 
 SUMMARY = "all ways and delays planned beforehand, for the last robot to arrive as early as possible"
 KNOWS = "all obstacles, all starts, all goals, and that everybody keeps to the plan"
@@ -19,8 +19,12 @@ GUARANTEES = ("no collision: plans are played before they are used, and robots w
 
 SAG = 0.008
 """Largest distance between an arc and the chord of one tick, as a part of a robot's radius."""
+MANY = 20
+"""For more robots than that fewer plans are made and relaxed by fewer sweeps."""
 PIECE = 1.0
 """Way between two points of a relaxed plan, as a part of the radius."""
+INSIDE = 1e-10
+"""How much nearer to their goals than the tolerance robots end."""
 HAIR = 2e-5
 """Gap to obstacles that plans keep apart from that, and to robots, but for ``robot_gap``."""
 
@@ -28,10 +32,10 @@ HAIR = 2e-5
 class Params(NamedTuple):
     """Numbers of the planned controller."""
 
-    attempts: int = 4
+    attempts: int = 3
     """Plans made independently of each other; the best is used."""
     iterations: int = 200
-    """Improvements tried of each; fewer for more than 20 robots."""
+    """Improvements tried of each."""
     robot_gap: float = 0.002
     """Gap between robots, as a part of the radius."""
     sweeps: int = 1500
@@ -58,8 +62,8 @@ class Tracks(NamedTuple):
     """Points of all robots of all runs (points, 2)."""
     begin: Ints
     """(runs, n): where a robot's begin."""
-    count: Ints
-    """(runs, n)."""
+    points: Ints
+    """(runs, n): how many they are."""
     time: Floats
     """(times,): those of all runs."""
     first: Ints
@@ -93,11 +97,11 @@ def _velocities(time: float, alive: Ints, state: Floats, stride: float, tracks: 
         if k < most:
             part = (time - tracks.time[first + k]) / (tracks.time[first + k + 1] - tracks.time[first + k])
         for i in range(state.shape[1]):
-            begin, last = tracks.begin[b, i], tracks.count[b, i] - 1
+            begin, last = tracks.begin[b, i], tracks.points[b, i] - 1
             one, two = begin + min(k, last), begin + min(k + 1, last)
             for axis in range(2):
-                want = tracks.position[one, axis] * (1.0 - part) + tracks.position[two, axis] * part
-                out[b, i, axis] = (want - state[b, i, axis]) / stride
+                move = tracks.position[two, axis] - tracks.position[one, axis]
+                out[b, i, axis] = (tracks.position[one, axis] + part * move - state[b, i, axis]) / stride
 
 
 def tick_steps(rules: Rules, discs: Floats, most: int) -> int:
@@ -118,8 +122,7 @@ def create(problem: Problem, params: Params) -> PlannedController:
     tracks = _packed(plans, problem.rules.n)
     controller = PlannedController(problem, tracks)
     outcome = play(problem, controller)
-    for b in np.flatnonzero(np.isin(outcome.status, COLLISIONS)):
-        tracks.count[b] = 1
+    tracks.points[np.isin(outcome.status, COLLISIONS)] = 1
     return controller
 
 
@@ -149,7 +152,7 @@ def _plan(
         if pair not in known:
             known[pair] = _paths.candidates(on, *pair)
     ways = [known[pair] for pair in pairs]
-    lengths = [[max(0.0, _paths.way_length(way) - rules.tol + 1e-7) for way in some] for some in ways]
+    lengths = [[max(0.0, _paths.way_length(way) - rules.tol + INSIDE) for way in some] for some in ways]
     longest = max((some[0] for some in lengths if some), default=0.0)
     steps = max(1, math.ceil(longest / rules.step - 1e-6))
     first = (steps - 1) % tick + 1
@@ -157,36 +160,37 @@ def _plan(
     ticks = (rules.max_steps - first) // tick + 1
     time = np.concatenate([[0.0], first + tick * np.arange(ticks - 1.0)])
     plan, work = _schedule.room_for(case, ticks)
-    longest_first = sorted(range(rules.n), key=lambda i: -case.count[i, 0])
-    best, bands = None, _bands(on, problem.goal[b], rules, case)
-    for attempt in range(max(1, params.attempts)):
-        if attempt == 0:
-            order = np.array(longest_first, dtype=np.int64)
-        else:
+    longest_first = sorted(range(rules.n), key=lambda i: -case.used[i, 0])
+    bands = _bands(on, problem.goal[b], rules, case)
+    few = min(1.0, MANY / rules.n)
+    found: list[tuple[int, float, Schedule]] = []
+    for attempt in range(max(1, math.ceil(few * params.attempts))):
+        order = np.array(longest_first, dtype=np.int64)
+        if attempt > 0:
             order = np.random.default_rng(attempt).permutation(rules.n)
         _schedule.search(case, plan, work, order, params.iterations, attempt)
-        found = Schedule(
-            [plan.track[i, : plan.last[i] + 1].copy() for i in range(rules.n)], time[: plan.last.max() + 1]
-        )
+        points = [plan.track[i, : plan.last[i] + 1].copy() for i in range(rules.n)]
+        made = Schedule(points, time[: plan.last.max() + 1])
         lost = int(np.count_nonzero(plan.arrival == _schedule.NEVER))
         if lost == 0 and plan.last.max() <= case.least:
-            return found
-        if lost == 0 and params.sweeps:
-            found = _relaxed(found, bands, longest, rules, params.sweeps)
-        if best is None or (lost, found.time[-1]) < best[:2]:
-            best = lost, float(found.time[-1]), found
-    assert best is not None
-    return best[2] if best[0] or not params.finish else _relaxed(best[2], bands, longest, rules, params.finish)
+            return made
+        if lost == 0:
+            made = _relaxed(made, bands, longest, rules, math.ceil(few * params.sweeps))
+        found.append((lost, float(made.time[-1]), made))
+    lost, _, made = min(found, key=lambda one: one[:2])
+    return made if lost else _relaxed(made, bands, longest, rules, math.ceil(few * params.finish))
 
 
 def _bands(on: _paths.Terrain, goal: Floats, rules: Rules, case: _schedule.Case) -> _elastic.Bands:
     point = np.empty((rules.n, 0, 2))
     over = 0.002 * rules.r
-    return _elastic.Bands(point, goal, on.discs, rules.tol - 1e-7, rules.r, case.apart, HAIR, over)
+    return _elastic.Bands(point, goal, on.discs, rules.tol - INSIDE, rules.r, case.apart, HAIR, over)
 
 
 def _relaxed(plan: Schedule, bands: _elastic.Bands, longest: float, rules: Rules, sweeps: int) -> Schedule:
     """Return the plan with all its ways relaxed, or the plan itself if that did not make it shorter."""
+    if sweeps <= 0:
+        return plan
     count = 2 + int(plan.time[-1] * rules.step / (PIECE * rules.r))
     point = _elastic.resampled(plan.point, plan.time, count)
     point, length = _elastic.relax(bands._replace(point=point), longest, sweeps)
@@ -230,7 +234,7 @@ def _packed(plans: list[Schedule], n: int) -> Tracks:
     return Tracks(
         position=np.concatenate([np.empty((0, 2)), *(points for plan in plans for points in plan.point)]),
         begin=(ends - count.ravel()).reshape(count.shape),
-        count=count,
+        points=count,
         time=np.concatenate([np.empty(0), *(plan.time for plan in plans)]),
         first=np.cumsum([0, *(len(plan.time) for plan in plans)]),
         now=np.zeros(len(plans), dtype=np.int64),
