@@ -41,7 +41,7 @@ class Plan(NamedTuple):
     track: Floats
     """(n, ticks, 2)."""
     last: Ints
-    """(n,): tick of arrival; 0 for who waits at its start because it has no plan yet."""
+    """(n,): tick of arrival; 0 for who waits at its start because it has no plan yet, -1 for who is not there."""
     arrival: Ints
     """(n,): the same, NEVER for who has no plan."""
 
@@ -97,7 +97,7 @@ def free_from(case: Case, plan: Plan, robot: int, x: float, y: float) -> int:
     """Return the tick from which on one can stand at a place for ever, NEVER if somebody stands there."""
     result = 0
     for j in range(len(plan.last)):
-        if j == robot:
+        if j == robot or plan.last[j] < 0:
             continue
         t = plan.last[j]
         px, py = plan.track[j, t, 0] - x, plan.track[j, t, 1] - y
@@ -122,7 +122,7 @@ def _free(
         return soonest
     soonest = NEVER
     for j in range(len(plan.last)):
-        if j == robot:
+        if j == robot or plan.last[j] < 0:
             continue
         if work.check[j] <= t:
             before, now = min(t - 1, plan.last[j]), min(t, plan.last[j])
@@ -279,8 +279,12 @@ def _improve(case: Case, plan: Plan, work: Work, cost: int) -> int:
         work.old_last[i], work.old_arrival[i] = plan.last[i], plan.arrival[i]
         for t in range(plan.last[i] + 1):
             work.old_track[i, t, 0], work.old_track[i, t, 1] = plan.track[i, t, 0], plan.track[i, t, 1]
+    # Who waits for its plan stands in the way of others for ever, or, as there is a plan to go back to, not at all.
+    ghosts = _random(work, 2) == 0
     for k in range(taken):
         forget(case, plan, work.order[k])
+        if ghosts:
+            plan.last[work.order[k]] = -1
     if _random(work, 3) == 0:
         other = _random(work, taken)
         work.order[0], work.order[other] = work.order[other], work.order[0]
@@ -315,9 +319,9 @@ def _neighbours(case: Case, plan: Plan, work: Work, first: int) -> int:
         ways = 0
         while ways < min(8, case.used.shape[1]) and case.used[first, ways] > 0:
             ways += 1
-        way = _random(work, ways)
+        way = _random(work, max(1, ways))
         for k in range(1, n):
-            if _meets(case, plan, first, way, work.order[k]):
+            if ways > 0 and _meets(case, plan, first, way, work.order[k]):
                 work.order[taken], work.order[k] = work.order[k], work.order[taken]
                 taken += 1
     most = min(n - taken, 4 if taken == 1 else 1)

@@ -19,7 +19,7 @@ GUARANTEES = ("no collision: plans are played before they are used, and robots w
 
 SAG = 0.008
 """Largest distance between an arc and the chord of one tick, as a part of a robot's radius."""
-MANY = 20
+MANY = 10
 """For more robots than that fewer plans are made and relaxed by fewer sweeps."""
 PIECE = 1.0
 """Way between two points of a relaxed plan, as a part of the radius."""
@@ -36,6 +36,8 @@ class Params(NamedTuple):
     """Plans made independently of each other; the best is used."""
     iterations: int = 200
     """Improvements tried of each."""
+    drafts: int = 10
+    """More plans without improvements: relaxed, some of them become the best."""
     robot_gap: float = 0.002
     """Gap between robots, as a part of the radius."""
     sweeps: int = 1500
@@ -157,18 +159,19 @@ def _plan(
     steps = max(1, math.ceil(longest / rules.step - 1e-6))
     first = (steps - 1) % tick + 1
     case = _case(ways, lengths, on, first, tick, steps, rules, params)
-    ticks = (rules.max_steps - first) // tick + 1
+    ticks = max(1, (rules.max_steps - first) // tick + 1)
     time = np.concatenate([[0.0], first + tick * np.arange(ticks - 1.0)])
     plan, work = _schedule.room_for(case, ticks)
     longest_first = sorted(range(rules.n), key=lambda i: -case.used[i, 0])
     bands = _bands(on, problem.goal[b], rules, case)
     few = min(1.0, MANY / rules.n)
     found: list[tuple[int, float, Schedule]] = []
-    for attempt in range(max(1, math.ceil(few * params.attempts))):
+    attempts, drafts = max(1, math.ceil(few * params.attempts)), int(few * params.drafts)
+    for attempt in range(attempts + drafts):
         order = np.array(longest_first, dtype=np.int64)
         if attempt > 0:
             order = np.random.default_rng(attempt).permutation(rules.n)
-        _schedule.search(case, plan, work, order, params.iterations, attempt)
+        _schedule.search(case, plan, work, order, params.iterations if attempt < attempts else 0, attempt)
         points = [plan.track[i, : plan.last[i] + 1].copy() for i in range(rules.n)]
         made = Schedule(points, time[: plan.last.max() + 1])
         lost = int(np.count_nonzero(plan.arrival == _schedule.NEVER))
