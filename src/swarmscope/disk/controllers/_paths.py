@@ -61,7 +61,7 @@ def terrain(
         spacing: largest distance of vertices on arcs.
     """
     n = len(start)
-    sag = spacing * spacing / r
+    sag = 0.33 * spacing * spacing / r  # of a chord twice as long, on a circle of radius 2 r, and a bit
     inner_start, inner_goal = (
         p * (1.0 - (apart + 3.0 * sag) / np.linalg.norm(p, axis=1))[:, None] for p in (start, goal)
     )

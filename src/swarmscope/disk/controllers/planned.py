@@ -9,7 +9,7 @@ import numpy as np
 
 from swarmscope._jit import jit
 from swarmscope.disk.controllers import _elastic, _paths, _schedule
-from swarmscope.disk.rules import Floats, Ints, Rules, goal_places, starts
+from swarmscope.disk.rules import Floats, Ints, Rules, goal_places, spacing, starts
 from swarmscope.disk.runs import COLLISIONS, Problem, play
 
 SUMMARY = "all ways and delays planned beforehand, for the last robot to arrive as early as possible"
@@ -128,6 +128,10 @@ def create(problem: Problem, params: Params) -> PlannedController:
     return controller
 
 
+def _apart(rules: Rules, params: Params) -> float:
+    return (2.0 + params.robot_gap) * rules.r + HAIR
+
+
 def _prepared(
     problem: Problem, which: int, params: Params
 ) -> tuple[_paths.Terrain, dict[tuple[int, int], list[Floats]], int]:
@@ -136,7 +140,7 @@ def _prepared(
     pace = tick * rules.step
     sharpest = rules.r + (float(discs[:, 2].min()) if len(discs) else 1.0)
     clear = 1.3 * pace * pace / (8.0 * sharpest) + HAIR
-    apart = (2.0 + params.robot_gap) * rules.r + HAIR
+    apart = _apart(rules, params)
     on = _paths.terrain(discs, rules.r, starts(rules.n), goal_places(rules.n), clear, apart, 0.5 * pace)
     return on, {}, tick
 
@@ -154,7 +158,9 @@ def _plan(
         if pair not in known:
             known[pair] = _paths.candidates(on, *pair)
     ways = [known[pair] for pair in pairs]
-    lengths = [[max(0.0, _paths.way_length(way) - rules.tol + INSIDE) for way in some] for some in ways]
+    # Robots stop short of their goals, but where goals are close to each other not so far that they bar neighbours'.
+    short = min(rules.tol - INSIDE, max(0.0, 0.49 * (spacing(rules.n) - _apart(rules, params))))
+    lengths = [[max(0.0, _paths.way_length(way) - short) for way in some] for some in ways]
     longest = max((some[0] for some in lengths if some), default=0.0)
     steps = max(1, math.ceil(longest / rules.step - 1e-6))
     first = (steps - 1) % tick + 1
@@ -166,12 +172,13 @@ def _plan(
     bands = _bands(on, problem.goal[b], rules, case)
     few = min(1.0, MANY / rules.n)
     found: list[tuple[int, float, Schedule]] = []
+    iterations = math.ceil(min(1.0, 5 * few) * params.iterations)
     attempts, drafts = max(1, math.ceil(few * params.attempts)), int(few * params.drafts)
     for attempt in range(attempts + drafts):
         order = np.array(longest_first, dtype=np.int64)
         if attempt > 0:
             order = np.random.default_rng(attempt).permutation(rules.n)
-        _schedule.search(case, plan, work, order, params.iterations if attempt < attempts else 0, attempt)
+        _schedule.search(case, plan, work, order, iterations if attempt < attempts else 0, attempt)
         points = [plan.track[i, : plan.last[i] + 1].copy() for i in range(rules.n)]
         made = Schedule(points, time[: plan.last.max() + 1])
         lost = int(np.count_nonzero(plan.arrival == _schedule.NEVER))
@@ -228,7 +235,7 @@ def _case(
                 count[i, used] = many
                 used += 1
     least = 1 + (steps - first) // tick
-    return _schedule.Case(place, count, (2.0 + params.robot_gap) * rules.r + HAIR, pace * (1.0 + 1e-9), least)
+    return _schedule.Case(place, count, _apart(rules, params), pace * (1.0 + 1e-9), least)
 
 
 def _packed(plans: list[Schedule], n: int) -> Tracks:
