@@ -24,6 +24,17 @@ app = typer.Typer(
 experiments = typer.Typer(no_args_is_help=True, help="Sweeps over worlds, planners and seeds: run, resume, report.")
 app.add_typer(experiments, name="experiment")
 
+disk = typer.Typer(no_args_is_help=True, help="Discs crossing a unit disk: compare controllers, try your own, look.")
+app.add_typer(disk, name="disk")
+
+Controllers = Annotated[
+    list[str] | None,
+    typer.Argument(
+        metavar="[CONTROLLER]...", help="Name (see 'swarmscope disk list'), NAME:key=value,... or FILE.py of yours."
+    ),
+]
+DiskMap = Annotated[str, typer.Option("--map", help="c0, u, crevice, one-disc, minima, empty, random:SEED, FILE.yaml.")]
+Permutation = Annotated[str | None, typer.Option(help="Goals of robots 0, 1, ...: 0,3,1,4,2. Else 0,1,2,...")]
 ExperimentFile = Annotated[str, typer.Argument(metavar="FILE", help="Experiment file (YAML), or a shipped one's name.")]
 Maps = Annotated[int | None, typer.Option(min=1, help="Only the first so many seeds (the papers have 20).")]
 EngineName = Annotated[str, typer.Option(help="in-process, local (processes) or ray (machines).")]
@@ -195,9 +206,7 @@ def experiment_status(file: ExperimentFile, maps: Maps = None, store: StorePath 
 
 
 @experiments.command("report", epilog="Example: [bold]swarmscope experiment report nav-scope --out report[/bold]")
-def experiment_report(
-    file: ExperimentFile, maps: Maps = None, store: StorePath = None, out: ReportOut = None
-) -> None:
+def experiment_report(file: ExperimentFile, maps: Maps = None, store: StorePath = None, out: ReportOut = None) -> None:
     """Write the report of the runs that are done."""
     from swarmscope.cli.experiment import report_command
 
@@ -214,6 +223,108 @@ def experiment_export(
     from swarmscope.cli.experiment import export_command
 
     export_command(file, csv, store)
+
+
+@disk.command(
+    "run",
+    epilog="Examples:\n\n"
+    "[bold]swarmscope disk run reactive --map minima --permutation 0,1,2,4,3[/bold]\n\n"
+    "[bold]swarmscope disk run report reactive planned --map minima --permutation 0,1,2,4,3[/bold]\n\n"
+    "[bold]swarmscope disk run mine.py --map random:7 --robots 20[/bold]",
+)
+def disk_run(
+    controller: Controllers = None,
+    map_: DiskMap = "c0",
+    permutation: Permutation = None,
+    robots: Annotated[int | None, typer.Option(min=1, max=200, help="Number of robots, else 5.")] = None,
+    radius: Annotated[
+        float | None, typer.Option(help="Their radius; by default they cover as much as 5 of 0.05.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder, else runs/disk/<map>-<permutation>.")] = None,
+) -> None:
+    """Play one run with one or several controllers; pictures and a replay page."""
+    from swarmscope.cli.disk import run_command
+
+    run_command(controller or ["reactive"], map_, permutation, robots, radius, out)
+
+
+@disk.command(
+    "table",
+    epilog="Examples:\n\n"
+    "[bold]swarmscope disk table report report:obstacle_buffer=0.005[/bold]\n\n"
+    "[bold]swarmscope disk table report reactive planned mine.py[/bold]\n\n"
+    "[bold]swarmscope disk table mine.py --map minima --permutation 01243 --permutation 43210[/bold]",
+)
+def disk_table(
+    controller: Controllers = None,
+    map_: Annotated[list[str] | None, typer.Option("--map", help="Map; repeatable. Else the five.")] = None,
+    permutation: Annotated[list[str] | None, typer.Option(help="Permutation; repeatable. Else all 120.")] = None,
+    out: Annotated[Path, typer.Option(help="Folder of page, figures and runs.")] = Path("runs/disk/table"),
+    workers: Workers = None,
+) -> None:
+    """Play all 600 runs and print the report's Table 1 beside ours and the bound."""
+    from swarmscope.cli.disk import table_command
+
+    table_command(controller or ["report"], map_ or [], permutation or [], out, workers)
+
+
+@disk.command(
+    "random",
+    epilog="Examples:\n\n"
+    "[bold]swarmscope disk random reactive --robots 5 --robots 20 --maps 1000[/bold]\n\n"
+    "[bold]swarmscope disk random report reactive --seeds disk-tuning --maps 50[/bold]",
+)
+def disk_random(
+    controller: Controllers = None,
+    robots: Annotated[list[int] | None, typer.Option(min=1, max=200, help="Number of robots; repeatable.")] = None,
+    maps: Annotated[int | None, typer.Option(min=1, help="Only the first so many seeds.")] = None,
+    seeds: Annotated[str, typer.Option(help="Set of seeds or range.")] = "disk-evaluation",
+    out: Annotated[Path, typer.Option(help="Folder of page, figures and runs.")] = Path("runs/disk/random"),
+    workers: Workers = None,
+) -> None:
+    """Play random maps with traps and narrow passages."""
+    from swarmscope.cli.disk import random_command
+
+    random_command(controller or ["reactive"], robots or [5], seeds, maps, out, workers)
+
+
+@disk.command(
+    "field",
+    epilog="Examples:\n\n"
+    "[bold]swarmscope disk field report --map minima --alone[/bold]\n\n"
+    "[bold]swarmscope disk field navigation-function --map crevice --robot 2[/bold]",
+)
+def disk_field(
+    controller: Annotated[str, typer.Argument(help="Name, NAME:key=value,... or FILE.py.")],
+    map_: DiskMap = "c0",
+    permutation: Permutation = None,
+    robot: Annotated[int, typer.Option(min=0, help="The robot that moves.")] = 0,
+    alone: Annotated[
+        bool, typer.Option("--alone", help="Without the others, which else stand at their starts.")
+    ] = False,
+    resolution: Annotated[int, typer.Option(min=5, max=401, help="Points along each side.")] = 61,
+    out: Annotated[Path | None, typer.Option(help="PNG file.")] = None,
+) -> None:
+    """Draw where a robot would go from anywhere, and where it would get stuck."""
+    from swarmscope.cli.disk import field_command
+
+    field_command(controller, map_, permutation, robot, alone, resolution, out)
+
+
+@disk.command("start", epilog="Example: [bold]swarmscope disk start mine.py[/bold]")
+def disk_start(file: Annotated[Path, typer.Argument(help="Python file to write.")]) -> None:
+    """Write a controller of your own to begin with."""
+    from swarmscope.cli.disk import start_command
+
+    start_command(file)
+
+
+@disk.command("list", epilog="Example: [bold]swarmscope disk list[/bold]")
+def disk_list() -> None:
+    """List controllers, what each knows and guarantees, and maps."""
+    from swarmscope.cli.disk import list_command
+
+    list_command()
 
 
 def main() -> None:

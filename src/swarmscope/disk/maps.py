@@ -76,13 +76,14 @@ def find_map(name: str, n: int) -> DiskMap:
         from swarmscope.disk.random_maps import random_map
         from swarmscope.disk.rules import scaled
 
-        return random_map(_seed(name), scaled(n)).map
+        return random_map(seed_of(name), scaled(n)).map
     if Path(name).suffix in {".yaml", ".yml", ".json"}:
         return read_map(Path(name))
     raise UnknownNameError("map", name, [*NAMED, "random:SEED", "FILE.yaml"])
 
 
-def _seed(name: str) -> int:
+def seed_of(name: str) -> int:
+    """Return the seed in 'random:SEED'."""
     text = name.partition(":")[2]
     if not text.isdecimal():
         raise ConfigError(name, "the seed of a random map is a whole number, as in random:7")

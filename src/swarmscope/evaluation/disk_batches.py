@@ -11,14 +11,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from swarmscope.disk import controllers
 from swarmscope.disk.runs import Controller, Film, Outcome, Problem, no_outcome, play
 from swarmscope.disk.user import UserController, compiled, function_of
 from swarmscope.errors import ConfigError, SwarmscopeError
 from swarmscope.evaluation.engines.local import start_worker
 
+Report = Callable[[int, float, float], None]
+"""Called with the number of runs done, and for a user's controller the seconds of a call and those left (else 0)."""
 RUNS_IN_A_BATCH = 20
 """So many runs of ours share the loop over steps; a user's are played one by one."""
 
@@ -49,6 +49,13 @@ class Choice:
             function_of(self.file, compiled(self.file))
         else:
             controllers.find(self.name, self.changes)
+
+    def kind(self) -> controllers.Kind:
+        """Return it as one that can be made for any runs."""
+        if not self.file:
+            return controllers.find(self.name, self.changes)
+        about = "of the user"
+        return controllers.Kind(self.label, about, about, about, (), lambda of, _: self.make(of))
 
     def make(self, of: Problem) -> Controller:
         """Return the controller for some runs."""
@@ -93,13 +100,9 @@ def play_all(
     choice: Choice,
     of: Problem,
     workers: int | None = None,
-    progress: Callable[[int, float], None] | None = None,
+    progress: Report | None = None,
 ) -> Result:
-    """Play all runs in ``workers`` processes (one for each core if None).
-
-    ``progress`` is called with the number of runs done and the seconds that a call of a user's controller takes
-    (0 for ours).
-    """
+    """Play all runs in ``workers`` processes (one for each core if None)."""
     runs = len(of.map_of)
     size = 1 if choice.file else RUNS_IN_A_BATCH
     parts = [slice(k, min(k + size, runs)) for k in range(0, runs, size)]
@@ -113,7 +116,8 @@ def play_all(
             kept[part] = new
         calls, seconds, done = calls + result.calls, seconds + result.seconds, done + part.stop - part.start
         if progress is not None:
-            progress(done, seconds / calls if calls else 0.0)
+            left = seconds / done * (runs - done) / workers
+            progress(done, seconds / calls if calls else 0.0, left)
 
     if workers == 1:
         for part in parts:
@@ -129,11 +133,3 @@ def play_all(
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
     return Result(whole, calls, seconds)
-
-
-def involved_words(outcome: Outcome, b: int) -> str:
-    """Return who collided in run b, '' if nobody did."""
-    one, two = (int(k) for k in np.asarray(outcome.involved[b]))
-    if one < 0:
-        return ""
-    return f"robot {one}" if two < 0 else f"robot {one} and {two}"

@@ -1,0 +1,277 @@
+"""``swarmscope disk``: the runs of the unit disk, compared, looked at, and with a user's own controller."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from swarmscope.cli._console import PlainConsole
+from swarmscope.cli.lists import field_docs
+from swarmscope.disk import controllers, maps, user
+from swarmscope.disk.bounds import bound
+from swarmscope.disk.check import check
+from swarmscope.disk.random_maps import random_map
+from swarmscope.disk.rules import Rules, all_permutations, read_permutation, scaled
+from swarmscope.disk.runs import Film, Problem, problem
+from swarmscope.disk.stalls import Situation, basins, describe
+from swarmscope.errors import ConfigError
+from swarmscope.evaluation.disk_batches import Choice, Report, play_all, play_batch, read_choice
+from swarmscope.evaluation.disk_figures import Played, csv_text, ended_words, failures, played, row, rows_by_map
+from swarmscope.evaluation.provenance import git_revision, versions
+from swarmscope.evaluation.seeds import seed_set
+from swarmscope.viewing.disk import table
+from swarmscope.viewing.report.publish import put_in_place
+
+SHOWN_FAILURES = 8
+PICTURES = 1500
+"""A film has about so many pictures."""
+SLOW_S = 300.0
+"""A user's controller that will take longer gets a note."""
+
+
+def run_command(
+    names: Sequence[str], map_: str, permutation: str | None, robots: int | None, radius: float | None, out: Path | None
+) -> None:
+    """Play one run with each controller, print how it went, write pictures and a replay page."""
+    from swarmscope.viewing.disk import pictures, replay
+
+    choices = [read_choice(name) for name in names]
+    of = one_problem(map_, permutation, robots, radius)
+    least = bound(of)
+    all_played, films = [], []
+    for choice in choices:
+        film = Film(max(1, math.ceil(int(least[0]) / PICTURES)), [])
+        with waiting(f"{choice.label} on {of.maps[0].name}"):
+            all_played.append(played(choice.label, of, play_batch(choice, of, film).outcome, least))
+        films.append(film)
+        print(f"{choice.label}: {ended_words(all_played[-1], 0)}")
+    contents: dict[str, bytes] = {}
+    with waiting("pictures"):
+        for one, film in zip(all_played, films, strict=True):
+            stem = file_stem(one.label)
+            contents[f"{stem}.png"] = pictures.trajectories_png(of, 0, one.outcome, film, one.label, int(least[0]))
+            contents[f"{stem}-clearance.png"] = pictures.clearance_png(of, 0, one.outcome, film, one.label)
+        shown = [replay.Shown(one.label, one.outcome, film) for one, film in zip(all_played, films, strict=True)]
+        contents["replay.html"] = replay.replay_page(of, shown, int(least[0])).encode()
+    of_permutation = "".join(str(k) for k in of.permutation[0]) if of.rules.n <= 10 else "many"
+    place = out or Path("runs") / "disk" / f"{file_stem(of.maps[0].name)}-{of_permutation}"
+    write(place, contents, all_played, {"controllers": list(names), "map": map_, "permutation": permutation})
+
+
+def table_command(
+    names: Sequence[str], map_names: Sequence[str], permutations: Sequence[str], out: Path, workers: int | None
+) -> None:
+    """Play all permutations on the maps with each controller and compare them as Table 1 of the report does."""
+    choices = [read_choice(name) for name in names]
+    rules = Rules()
+    chosen = [read_permutation(text, rules.n) for text in permutations] or list(all_permutations(rules.n))
+    of = problem(rules, [maps.find_map(name, rules.n) for name in map_names or maps.REPORT_MAPS], chosen)
+    check(of)
+    group = play_choices(choices, of, workers)
+    all_rows = [one for entry in group for one in rows_by_map(entry)]
+    PlainConsole(width=None if sys.stdout.isatty() else 150).print(
+        table.terminal_table(all_rows, "steps until all have arrived", len(chosen) == math.factorial(rules.n))
+    )
+    print_failures(group)
+    config = {"controllers": list(names), "maps": [one.name for one in of.maps], "permutations": len(chosen)}
+    about = (
+        f"{len(of.maps)} maps, {len(chosen)} permutations of the goals of {rules.n} robots: every controller played "
+        "the same runs under the same rules."
+    )
+    finish(out, "Controllers on the unit disk", about, "disk table", config, [group])
+
+
+def random_command(
+    names: Sequence[str], robots: Sequence[int], seeds: str, count: int | None, out: Path, workers: int | None
+) -> None:
+    """Play random maps with each controller: how many arrive, how far from the bound, and that nobody collides."""
+    choices = [read_choice(name) for name in names]
+    chosen = seed_set(seeds)[:count]
+    groups = []
+    for n in robots:
+        rules = scaled(n)
+        with waiting(f"{len(chosen)} random maps for {n} robots"):
+            cases = [random_map(seed, rules) for seed in chosen]
+        permutations = np.array([one.permutation for one in cases])
+        of = Problem(rules, tuple(one.map for one in cases), np.arange(len(cases)), permutations)
+        group = play_choices(choices, of, workers)
+        groups.append(group)
+        all_rows = [row(entry, f"{len(cases)} maps") for entry in group]
+        title = f"{n} robots of radius {rules.r:.4g} on random maps"
+        PlainConsole(width=None if sys.stdout.isatty() else 150).print(table.terminal_table(all_rows, title, False))
+        for entry in all_rows:
+            share = entry.share
+            print(f"{entry.controller}: {share.estimate:.2%} arrive (95 %: {share.low:.2%} to {share.high:.2%})")
+        print_failures(group)
+    config = {"controllers": list(names), "robots": list(robots), "seeds": seeds, "maps": len(chosen)}
+    about = (
+        f"{len(chosen)} random maps, each with a random permutation: loose discs, U-shaped traps, passages just "
+        "wider and just narrower than a robot. Every controller played the same runs."
+    )
+    finish(out, "Controllers on random maps", about, "disk random", config, groups)
+
+
+def field_command(
+    name: str, map_: str, permutation: str | None, robot: int, alone: bool, resolution: int, out: Path | None
+) -> None:
+    """Draw the field of one robot's velocities, and say where robots get stuck in it."""
+    from swarmscope.viewing.disk import pictures
+
+    choice = read_choice(name)
+    of = one_problem(map_, permutation, None, None)
+    if not 0 <= robot < of.rules.n:
+        raise ConfigError("robot", f"there is no robot {robot}; they are 0 to {of.rules.n - 1}")
+    others = None if alone else of.start[0]
+    situation = Situation(choice.kind(), of.maps[0], of.rules, tuple(of.permutation[0].tolist()), robot, others)
+    with waiting(f"field of {choice.label} on {of.maps[0].name}"):
+        print(describe(basins(situation, resolution)))
+        picture = pictures.field_png(situation, resolution=resolution)
+    place = out or Path("runs") / "disk" / f"field-{file_stem(choice.label)}-{file_stem(of.maps[0].name)}-{robot}.png"
+    put_in_place(place.parent, {place.name: picture})
+    print(place)
+
+
+def start_command(file: Path) -> None:
+    """Write a controller to begin with."""
+    print(f"{user.write_starter(file)} is there; try it:")
+    print(f"  swarmscope disk run {file} --map c0 --permutation 0,3,1,4,2")
+
+
+def list_command() -> None:
+    """Print controllers and maps."""
+    console = PlainConsole()
+    for name in controllers.names():
+        kind = controllers.find(name)
+        console.print(f"[bold]{name}[/bold]  {kind.summary}", highlight=False)
+        console.print(f"  knows: {kind.knows}", highlight=False)
+        console.print(f"  guarantees: {kind.guarantees}", highlight=False)
+        module = sys.modules[kind.create.__module__]
+        numbers = Table("parameter", "default", "meaning")
+        for key, default in kind.params._asdict().items():
+            numbers.add_row(key, str(default), field_docs(module, "Params").get(key, ""))
+        console.print(numbers)
+    console.print(f"[bold]FILE.py[/bold]  a file of yours with {user.SIGNATURE}", highlight=False)
+    places = Table("map", "obstacles", "what it is")
+    for one in maps.NAMED.values():
+        places.add_row(one.name, str(len(one.obstacles)), one.about)
+    places.add_row("random:SEED", "", "a random one, the same for the same seed and number of robots")
+    places.add_row("FILE.yaml", "", "'obstacles', a list of 'center: [x, y]' and 'radius'")
+    console.print(places)
+
+
+def one_problem(map_: str, permutation: str | None, robots: int | None, radius: float | None) -> Problem:
+    """Return the problem of one run. Errors: those of maps, rules and permutations, and of runs that cannot end."""
+    n = robots or Rules().n
+    rules = scaled(n) if radius is None else scaled(n, r=radius)
+    if map_.startswith("random:") and permutation is None:
+        case = random_map(maps.seed_of(map_), rules)
+        place, chosen = case.map, case.permutation
+    else:
+        place = maps.find_map(map_, n)
+        chosen = tuple(range(n)) if permutation is None else read_permutation(permutation, n)
+    of = problem(rules, [place], [chosen])
+    check(of)
+    return of
+
+
+def play_choices(choices: Sequence[Choice], of: Problem, workers: int | None) -> list[Played]:
+    """Play the runs with every controller, with a bar."""
+    least = bound(of)
+    found = []
+    for choice in choices:
+        with progress_bar(choice, len(of.map_of)) as progress:
+            found.append(played(choice.label, of, play_all(choice, of, workers, progress).outcome, least))
+    return found
+
+
+@contextmanager
+def progress_bar(choice: Choice, runs: int) -> Iterator[Report]:
+    """Show how many runs are done, and for a user's controller how slow it is."""
+    columns = TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[note]}"), TimeElapsedColumn()
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        job = bar.add_task(choice.label, total=runs, note=f"0 of {runs} runs")
+        told = False
+
+        def report(done: int, call_s: float, left_s: float) -> None:
+            nonlocal told
+            slow = f", {call_s * 1e6:.0f} us a call, {left_s / 60:.0f} min left" if call_s else ""
+            bar.update(job, completed=done, note=f"{done} of {runs} runs{slow}")
+            if left_s > SLOW_S and not told:
+                told = True
+                bar.console.print(
+                    f"{choice.label} takes {call_s * 1e6:.0f} us a call: {runs} runs will take about "
+                    f"{left_s / 60:.0f} min. Fewer: --map and --permutation."
+                )
+
+        yield report
+
+
+@contextmanager
+def waiting(what: str) -> Iterator[None]:
+    """Show that something is under way."""
+    columns = TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn()
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        bar.add_task(what, total=None)
+        yield
+
+
+def print_failures(group: Sequence[Played]) -> None:
+    """Name the runs that did not arrive; of many only the first."""
+    for of in group:
+        failed = failures(of)
+        for place, permutation, what in failed[:SHOWN_FAILURES]:
+            shown = permutation if of.problem.rules.n <= 20 else "..."
+            print(f"{of.label}: {place}, permutation {shown}: {what}")
+        if len(failed) > SHOWN_FAILURES:
+            print(f"{of.label}: and {len(failed) - SHOWN_FAILURES} more")
+
+
+def finish(
+    out: Path, title: str, about: str, command: str, config: dict[str, Any], groups: Sequence[Sequence[Played]]
+) -> None:
+    """Write page, CSV and figures of a comparison."""
+    facts = [("version", versions()["swarmscope"]), ("revision", git_revision())]
+    line = " ".join(["swarmscope", command, *config["controllers"]])
+    page = table.page(title, about, line, facts, groups)
+    write(out, {"report.html": page.encode()}, [one for group in groups for one in group], config)
+
+
+def write(out: Path, contents: dict[str, bytes], all_played: Sequence[Played], config: dict[str, Any]) -> None:
+    """Write everything, with the runs as CSV and where they come from, and print the names."""
+    rules = all_played[0].problem.rules.as_dict()
+    figures = [row(one, "all")._asdict() for one in all_played]
+    about = {"config": config, "rules": rules, "versions": versions(), "git": git_revision(), "figures": figures}
+    contents = contents | {"runs.csv": csv_text(all_played).encode(), "result.json": plain_json(about)}
+    put_in_place(out, contents)
+    for name in contents:
+        print(out / name)
+
+
+def plain_json(data: dict[str, Any]) -> bytes:
+    """Return JSON without numbers that JSON does not have."""
+
+    def plain(value: Any) -> Any:
+        if isinstance(value, dict):
+            return {key: plain(entry) for key, entry in value.items()}
+        if isinstance(value, tuple) and hasattr(value, "_asdict"):
+            return plain(value._asdict())
+        if isinstance(value, list | tuple):
+            return [plain(entry) for entry in value]
+        return None if isinstance(value, float) and not math.isfinite(value) else value
+
+    return (json.dumps(plain(data), indent=1, allow_nan=False) + "\n").encode()
+
+
+def file_stem(label: str) -> str:
+    """Return a label as a part of a file name."""
+    return "".join(c if c.isalnum() or c in "-_." else "-" for c in label).strip("-.") or "run"
