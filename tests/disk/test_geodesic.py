@@ -63,6 +63,13 @@ def test_who_stands_in_the_margin_can_leave():
     assert abs(dx) < 0.1 and abs(abs(dy) - 1.0) < 0.01
 
 
+def test_who_stands_in_two_margins_does_not_go_through_a_closed_gap():
+    # A gap that is open for the robot alone, but not with the margin: from its mouth the way leads back and round.
+    gap = [(0.5, 0.22, 0.2), (0.5, -0.22, 0.2)]
+    assert way(gap, (0.62, 0.0), (-0.999, 0.0), margin=0.054)[0] > 1.9
+    assert way(gap, (0.62, 0.0), (-0.999, 0.0), margin=0.0)[0] == pytest.approx(1.619)
+
+
 def test_bounds_are_the_published_ones():
     of = runs.problem(rules.Rules(), list(maps.REPORT_MAPS.values()), list(rules.all_permutations(5)))
     found = bounds.bound(of).reshape(5, 120)

@@ -20,13 +20,13 @@ from swarmscope.cli.lists import field_docs
 from swarmscope.disk import controllers, maps, user
 from swarmscope.disk.bounds import bound
 from swarmscope.disk.check import check
-from swarmscope.disk.random_maps import random_map
+from swarmscope.disk.random_maps import RandomCase, random_map
 from swarmscope.disk.rules import Rules, all_permutations, read_permutation, scaled
 from swarmscope.disk.runs import Film, Problem, problem
 from swarmscope.disk.stalls import Situation, basins, describe
 from swarmscope.errors import ConfigError
 from swarmscope.evaluation.disk_batches import Choice, Report, play_all, play_batch, read_choice
-from swarmscope.evaluation.disk_figures import Played, csv_text, ended_words, failures, played, row, rows_by_map
+from swarmscope.evaluation.disk_figures import Played, Row, csv_text, ended_words, failures, played, row, rows_by_map
 from swarmscope.evaluation.provenance import git_revision, versions
 from swarmscope.evaluation.seeds import seed_set
 from swarmscope.viewing.disk import table
@@ -45,7 +45,7 @@ def run_command(
     """Play one run with each controller, print how it went, write pictures and a replay page."""
     from swarmscope.viewing.disk import pictures, replay
 
-    choices = [read_choice(name) for name in names]
+    choices = read_choices(names)
     of = one_problem(map_, permutation, robots, radius)
     least = bound(of)
     all_played, films = [], []
@@ -65,60 +65,63 @@ def run_command(
         contents["replay.html"] = replay.replay_page(of, shown, int(least[0])).encode()
     of_permutation = "".join(str(k) for k in of.permutation[0]) if of.rules.n <= 10 else "many"
     place = out or Path("runs") / "disk" / f"{file_stem(of.maps[0].name)}-{of_permutation}"
-    write(place, contents, all_played, {"controllers": list(names), "map": map_, "permutation": permutation})
+    about = f"One run on {of.maps[0].name} by {len(choices)} controllers."
+    options = [f"--map {map_}", f"--permutation {','.join(map(str, of.permutation[0]))}", f"--robots {of.rules.n}"]
+    results = Results(place, f"A run on {of.maps[0].name}", about, ["disk", "run", *names, *options])
+    results.save([all_played], contents)
+    results.print_names()
 
 
 def table_command(
     names: Sequence[str], map_names: Sequence[str], permutations: Sequence[str], out: Path, workers: int | None
 ) -> None:
     """Play all permutations on the maps with each controller and compare them as Table 1 of the report does."""
-    choices = [read_choice(name) for name in names]
+    choices = read_choices(names)
     rules = Rules()
     chosen = [read_permutation(text, rules.n) for text in permutations] or list(all_permutations(rules.n))
     of = problem(rules, [maps.find_map(name, rules.n) for name in map_names or maps.REPORT_MAPS], chosen)
     check(of)
-    group = play_choices(choices, of, workers)
-    all_rows = [one for entry in group for one in rows_by_map(entry)]
-    PlainConsole(width=None if sys.stdout.isatty() else 150).print(
-        table.terminal_table(all_rows, "steps until all have arrived", len(chosen) == math.factorial(rules.n))
-    )
-    print_failures(group)
-    config = {"controllers": list(names), "maps": [one.name for one in of.maps], "permutations": len(chosen)}
+    options = [f"--map {name}" for name in map_names] + [f"--permutation {text}" for text in permutations]
     about = (
         f"{len(of.maps)} maps, {len(chosen)} permutations of the goals of {rules.n} robots: every controller played "
         "the same runs under the same rules."
     )
-    finish(out, "Controllers on the unit disk", about, "disk table", config, [group])
+    results = Results(out, "Controllers on the unit disk", about, ["disk", "table", *names, *options])
+    for group in play_choices(choices, of, workers):
+        results.save([group])
+    all_rows = [one for entry in group for one in rows_by_map(entry)]
+    print_table(all_rows, "steps until all have arrived", len(chosen) == math.factorial(rules.n))
+    print_failures(group)
+    results.print_names()
 
 
 def random_command(
     names: Sequence[str], robots: Sequence[int], seeds: str, count: int | None, out: Path, workers: int | None
 ) -> None:
     """Play random maps with each controller: how many arrive, how far from the bound, and that nobody collides."""
-    choices = [read_choice(name) for name in names]
+    choices = read_choices(names)
     chosen = seed_set(seeds)[:count]
-    groups = []
-    for n in robots:
-        rules = scaled(n)
-        with waiting(f"{len(chosen)} random maps for {n} robots"):
-            cases = [random_map(seed, rules) for seed in chosen]
-        permutations = np.array([one.permutation for one in cases])
-        of = Problem(rules, tuple(one.map for one in cases), np.arange(len(cases)), permutations)
-        group = play_choices(choices, of, workers)
-        groups.append(group)
-        all_rows = [row(entry, f"{len(cases)} maps") for entry in group]
-        title = f"{n} robots of radius {rules.r:.4g} on random maps"
-        PlainConsole(width=None if sys.stdout.isatty() else 150).print(table.terminal_table(all_rows, title, False))
-        for entry in all_rows:
-            share = entry.share
-            print(f"{entry.controller}: {share.estimate:.2%} arrive (95 %: {share.low:.2%} to {share.high:.2%})")
-        print_failures(group)
-    config = {"controllers": list(names), "robots": list(robots), "seeds": seeds, "maps": len(chosen)}
+    options = [*(f"--robots {n}" for n in robots), f"--seeds {seeds}", f"--maps {len(chosen)}"]
     about = (
         f"{len(chosen)} random maps, each with a random permutation: loose discs, U-shaped traps, passages just "
         "wider and just narrower than a robot. Every controller played the same runs."
     )
-    finish(out, "Controllers on random maps", about, "disk random", config, groups)
+    results = Results(out, "Controllers on random maps", about, ["disk", "random", *names, *options])
+    done: list[list[Played]] = []
+    for n in robots:
+        rules = scaled(n)
+        with waiting(f"{len(chosen)} random maps for {n} robots"):
+            of = as_problem(rules, [random_map(seed, rules) for seed in chosen])
+        for group in play_choices(choices, of, workers):
+            results.save([*done, group])
+        done.append(group)
+        all_rows = [row(entry, f"{len(chosen)} maps") for entry in group]
+        print_table(all_rows, f"{n} robots of radius {rules.r:.4g} on random maps", False)
+        for entry in all_rows:
+            share = entry.share
+            print(f"{entry.controller}: {share.estimate:.2%} arrive (95 %: {share.low:.2%} to {share.high:.2%})")
+        print_failures(group)
+    results.print_names()
 
 
 def field_command(
@@ -184,14 +187,35 @@ def one_problem(map_: str, permutation: str | None, robots: int | None, radius: 
     return of
 
 
-def play_choices(choices: Sequence[Choice], of: Problem, workers: int | None) -> list[Played]:
-    """Play the runs with every controller, with a bar."""
+def read_choices(names: Sequence[str]) -> list[Choice]:
+    """Return the controllers of a command line, which have to differ in name. Errors: those of ``read_choice``."""
+    choices = [read_choice(name) for name in names]
+    labels = [choice.label for choice in choices]
+    twice = next((label for label in labels if labels.count(label) > 1), None)
+    if twice is not None:
+        raise ConfigError(twice, "two controllers have this name; name each once, and give files different names")
+    return choices
+
+
+def as_problem(rules: Rules, cases: Sequence[RandomCase]) -> Problem:
+    """Return the runs of some random cases."""
+    permutations = np.array([one.permutation for one in cases])
+    return Problem(rules, tuple(one.map for one in cases), np.arange(len(cases)), permutations)
+
+
+def play_choices(choices: Sequence[Choice], of: Problem, workers: int | None) -> Iterator[list[Played]]:
+    """Play the runs with one controller after the other, with a bar; yield what is done each time."""
     least = bound(of)
-    found = []
+    found: list[Played] = []
     for choice in choices:
         with progress_bar(choice, len(of.map_of)) as progress:
             found.append(played(choice.label, of, play_all(choice, of, workers, progress).outcome, least))
-    return found
+        yield found
+
+
+def print_table(all_rows: Sequence[Row], title: str, printed: bool) -> None:
+    """Print rows as a table, in full where nobody looks at a terminal."""
+    PlainConsole(width=None if sys.stdout.isatty() else 150).print(table.terminal_table(all_rows, title, printed))
 
 
 @contextmanager
@@ -236,25 +260,38 @@ def print_failures(group: Sequence[Played]) -> None:
             print(f"{of.label}: and {len(failed) - SHOWN_FAILURES} more")
 
 
-def finish(
-    out: Path, title: str, about: str, command: str, config: dict[str, Any], groups: Sequence[Sequence[Played]]
-) -> None:
-    """Write page, CSV and figures of a comparison."""
-    facts = [("version", versions()["swarmscope"]), ("revision", git_revision())]
-    line = " ".join(["swarmscope", command, *config["controllers"]])
-    page = table.page(title, about, line, facts, groups)
-    write(out, {"report.html": page.encode()}, [one for group in groups for one in group], config)
+class Results:
+    """The folder of a comparison; what is done is saved as soon as it is, so that stopping loses nothing."""
 
+    def __init__(self, out: Path, title: str, about: str, words: Sequence[str]) -> None:
+        self.out, self.title, self.about = out, title, about
+        self.command = " ".join(["swarmscope", *words])
+        self.names: list[str] = []
+        put_in_place(out, {})  # a folder that cannot be written is told before hours of work
 
-def write(out: Path, contents: dict[str, bytes], all_played: Sequence[Played], config: dict[str, Any]) -> None:
-    """Write everything, with the runs as CSV and where they come from, and print the names."""
-    rules = all_played[0].problem.rules.as_dict()
-    figures = [row(one, "all")._asdict() for one in all_played]
-    about = {"config": config, "rules": rules, "versions": versions(), "git": git_revision(), "figures": figures}
-    contents = contents | {"runs.csv": csv_text(all_played).encode(), "result.json": plain_json(about)}
-    put_in_place(out, contents)
-    for name in contents:
-        print(out / name)
+    def save(self, groups: Sequence[Sequence[Played]], more: dict[str, bytes] | None = None) -> None:
+        """Write page, runs and figures of what is done so far."""
+        facts = [("version", versions()["swarmscope"]), ("revision", git_revision())]
+        all_played = [one for group in groups for one in group]
+        about = {
+            "command": self.command,
+            "rules": [group[0].problem.rules.as_dict() for group in groups],
+            "versions": versions(),
+            "git": git_revision(),
+            "figures": [row(one, "all")._asdict() | {"robots": one.problem.rules.n} for one in all_played],
+        }
+        contents = (more or {}) | {
+            "report.html": table.page(self.title, self.about, self.command, facts, groups).encode(),
+            "runs.csv": csv_text(all_played).encode(),
+            "result.json": plain_json(about),
+        }
+        put_in_place(self.out, contents)
+        self.names = list(contents)
+
+    def print_names(self) -> None:
+        """Print the files."""
+        for name in self.names:
+            print(self.out / name)
 
 
 def plain_json(data: dict[str, Any]) -> bytes:

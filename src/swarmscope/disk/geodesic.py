@@ -199,6 +199,8 @@ def _by_tangent(
     c = slot // 2
     if not segment_is_free(ways, ways.field_map[field], x, y, ex, ey, c, -1):
         return math.inf, dx, dy
+    if length < TOUCH and _leads_into_another(ways, ways.field_map[field], x, y, dx, dy, c):
+        return math.inf, dx, dy
     angle = positive_angle(math.atan2(ey - ways.disc[c, 1], ex - ways.disc[c, 0]))
     return length + _along_slot(ways, field, slot, angle), dx, dy
 
@@ -220,6 +222,16 @@ def _is_free(discs: Floats, row: Floats) -> bool:
         if nearest_on_the_way(ax - x, ay - y, bx - x, by - y) < discs[c, 2] - TOUCH:
             return False
     return True
+
+
+@jit_inner
+def _leads_into_another(ways: Ways, which: int, x: float, y: float, dx: float, dy: float, own: int) -> bool:
+    """Return whether who stands in another disc, too, would go deeper into it in direction d."""
+    for c in range(ways.disc_start[which], ways.disc_start[which + 1]):
+        px, py, rho = ways.disc[c, 0] - x, ways.disc[c, 1] - y, ways.disc[c, 2] - TOUCH
+        if c != own and px * px + py * py < rho * rho and px * dx + py * dy > 0.0:
+            return True
+    return False
 
 
 @jit_alloc

@@ -34,12 +34,12 @@ PUBLISHED = {
 }
 """Unit-disk report, Table 1, by our names of its maps."""
 
-DIFFERENCES = (
+DIFFERENCE = (
     "The report's controller in our hands arrives in 593 of 600 runs as printed, and on one-disc every figure is the "
     "printed one, but for the standard deviation. The means of the other maps differ from the printed ones by 0.3 to "
     "2.3 %, and the longest runs by more, so those runs were made with slightly different code or obstacles. The "
     "printed standard deviations are 1.1 to 1.95 times ours; on one-disc, where all runs are the same, 2114 is "
-    "printed and 1086 is the deviation of the 120 runs.",
+    "printed and 1086 is the deviation of the 120 runs."
 )
 
 

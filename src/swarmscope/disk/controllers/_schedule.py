@@ -157,13 +157,15 @@ def least_delay(case: Case, plan: Plan, work: Work, robot: int, way: int, most: 
         for k in range(count):
             how = 1 if k == 0 and d == 0 else 0
             if k > 0 and work.reach[d, k - 1] > 0:
-                result = _free(case, plan, work, robot, k + d, soonest, place[k - 1, 0], place[k - 1, 1],
-                               place[k, 0], place[k, 1])
+                result = _free(
+                    case, plan, work, robot, k + d, soonest, place[k - 1, 0], place[k - 1, 1], place[k, 0], place[k, 1]
+                )
                 if result >= 0:
                     how, soonest = 1, result
             if how == 0 and d > 0 and work.reach[d - 1, k] > 0:
-                result = _free(case, plan, work, robot, k + d, soonest, place[k, 0], place[k, 1],
-                               place[k, 0], place[k, 1])
+                result = _free(
+                    case, plan, work, robot, k + d, soonest, place[k, 0], place[k, 1], place[k, 0], place[k, 1]
+                )
                 if result >= 0:
                     how, soonest = 2, result
             work.reach[d, k] = how

@@ -14,8 +14,10 @@ from swarmscope.disk.runs import COLLISIONS, Problem, play
 
 SUMMARY = "all ways and delays planned beforehand, for the last robot to arrive as early as possible"
 KNOWS = "all obstacles, all starts, all goals, and that everybody keeps to the plan"
-GUARANTEES = ("no collision: plans are played before they are used, and robots without one stay where they are; "
-              "neither arrival nor the best plan is guaranteed")
+GUARANTEES = (
+    "no collision: plans are played before they are used, and robots without one stay where they are; "
+    "neither arrival nor the best plan is guaranteed"
+)
 
 SAG = 0.008
 """Largest distance between an arc and the chord of one tick, as a part of a robot's radius."""

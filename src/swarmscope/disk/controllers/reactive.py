@@ -15,7 +15,9 @@ Who gives way is settled once, and in the same way by all: the robot with the lo
 way from its place to the rim in the direction in which it set out (ties by number). In a total order no two robots
 can each wait for the other, and the first of all never leaves its shortest way for somebody that moves. Everybody
 also plans round robots that stand. A standing robot that goes first is expected to go on in the direction in which
-it last moved, so that those who block it clear the way, if need be backwards.
+it last moved, so that those who block it clear the way, if need be backwards. Two can still stand on either side of
+a passage, each for the other: who has stood for ``patience`` goes on as if those behind it in the order were not
+there until its way is clear, and they give way.
 
 What is chosen passes ``nearest_admissible`` in every step, which rules out contact whatever was chosen.
 """
@@ -63,6 +65,8 @@ class Params(NamedTuple):
     """Weight of a conflict."""
     room: float = 0.1
     """Gap that is kept from predicted robots."""
+    patience: float = 5.0
+    """Time after which one who has waited goes on as if those who stand were not there."""
     again: float = 0.1
     """Time between two looks."""
     gain: float = 0.9
@@ -84,6 +88,8 @@ class Memory(NamedTuple):
     """(runs, n, 2): direction in which each was last seen to move."""
     rank: Floats
     """(runs, n): free run at the start; the larger goes first."""
+    waited: Ints
+    """(runs, n): looks since a robot began to stand among others, and from ``patience`` on until its way is clear."""
     cost: Floats
     known: Ints
     near: Ints
@@ -102,6 +108,7 @@ class Scale(NamedTuple):
     room: float
     gain: float
     cadence: int
+    patience: int
 
 
 def manoeuvres(r: float) -> Floats:
@@ -122,16 +129,18 @@ class ReactiveController:
         self._first, self._disc = problem.discs()
         self._ways, self._field = bounds.ways_of(problem, params.margin)
         self._menu = manoeuvres(rules.r)
+        cadence = max(1, round(params.again * rules.r / rules.step))
         self._scale = Scale(
-            rules.r,
-            rules.step,
-            rules.tol,
-            params.horizon * rules.r,
-            params.stride * rules.r,
-            params.fear * rules.r,
-            params.room * rules.r,
-            params.gain,
-            max(1, round(params.again * rules.r / rules.step)),
+            r=rules.r,
+            step=rules.step,
+            tol=rules.tol,
+            horizon=params.horizon * rules.r,
+            stride=params.stride * rules.r,
+            fear=params.fear * rules.r,
+            room=params.room * rules.r,
+            gain=params.gain,
+            cadence=cadence,
+            patience=max(1, round(params.patience * rules.r / (cadence * rules.step))),
         )
         runs, n = problem.goal.shape[:2]
         self._memory = Memory(
@@ -140,6 +149,7 @@ class ReactiveController:
             holds=np.zeros((runs, n), dtype=np.int64),
             heading=np.zeros((runs, n, 2)),
             rank=np.zeros((runs, n)),
+            waited=np.zeros((runs, n), dtype=np.int64),
             cost=np.zeros(len(self._menu)),
             known=np.zeros(len(self._menu), dtype=np.int64),
             near=np.zeros(n, dtype=np.int64),
@@ -249,15 +259,19 @@ def _goes_first(b: int, i: int, j: int, memory: Memory) -> bool:
 
 
 @jit_inner
-def _concerned(b: int, i: int, state: Floats, velocity: Floats, scale: Scale, memory: Memory) -> int:
-    """List the robots that i has to mind: those that go first, and those that stand. Return their number."""
+def _concerned(b: int, i: int, pushes: bool, state: Floats, velocity: Floats, scale: Scale, memory: Memory) -> int:
+    """List the robots that i has to mind: those that go first, and (unless it pushes) those that stand.
+
+    Return their number.
+    """
     reach = 2.0 * (scale.horizon + scale.r) + scale.room
     count = 0
     for j in range(state.shape[1]):
         if j == i or abs(state[b, j, 0] - state[b, i, 0]) > reach or abs(state[b, j, 1] - state[b, i, 1]) > reach:
             continue
         vx, vy = velocity[b, j, 0], velocity[b, j, 1]
-        if vx * vx + vy * vy < STANDS * STANDS or _goes_first(b, i, j, memory):
+        stands = vx * vx + vy * vy < STANDS * STANDS
+        if (stands and not pushes) or _goes_first(b, i, j, memory):
             memory.near[count] = j
             count += 1
     return count
@@ -314,6 +328,8 @@ def _clear_until(
     memory: Memory,
 ) -> float:
     """Return when one who follows the shortest way from (x, y) at time t meets somebody; infinity if not soon."""
+    if count == 0:
+        return math.inf
     end = t + scale.horizon
     straight, dx, dy, slot = 0.0, 0.0, 0.0, 0
     while t < end:
@@ -352,12 +368,19 @@ def _decide(
 ) -> int:
     """Choose between the shortest way (0) and a manoeuvre (1, and its velocity is noted)."""
     x, y = state[b, i, 0], state[b, i, 1]
-    count = _concerned(b, i, state, velocity, scale, memory)
-    if count == 0:
-        return 0
+    count = _concerned(b, i, False, state, velocity, scale, memory)
     clear = _clear_until(b, i, count, x, y, 0.0, ways, field, state, velocity, scale, memory)
     if clear == math.inf:
+        memory.waited[b, i] = 0
         return 0
+    vx, vy = velocity[b, i, 0], velocity[b, i, 1]
+    if memory.waited[b, i] < scale.patience:
+        memory.waited[b, i] = memory.waited[b, i] + 1 if vx * vx + vy * vy < STANDS * STANDS else 0
+    if memory.waited[b, i] >= scale.patience:
+        count = _concerned(b, i, True, state, velocity, scale, memory)
+        clear = _clear_until(b, i, count, x, y, 0.0, ways, field, state, velocity, scale, memory)
+        if clear == math.inf:
+            return 0
     length, wx, wy, _ = look_up(ways, field, x, y)
     best, acts = length + _fear(clear, scale), 0
     for k in range(len(menu)):

@@ -9,7 +9,7 @@ import rich.table
 from rich import box
 
 from swarmscope.evaluation.disk_figures import (
-    DIFFERENCES,
+    DIFFERENCE,
     PUBLISHED,
     Played,
     Row,
@@ -17,12 +17,24 @@ from swarmscope.evaluation.disk_figures import (
     failures,
     rows_by_map,
 )
-from swarmscope.evaluation.statistics import Interval
 from swarmscope.viewing.report import blocks
 from swarmscope.viewing.report.page import page_text
 
 PRINTED = "printed in the report"
 MOST_FAILURES = 30
+MOST_MAPS = 12
+"""With more maps than that only the figures of all of them together are shown."""
+PUBLISHED_RUNS = 120
+NOTES = {
+    "Bound": "every robot alone on its shortest way round the obstacles at full speed; the run's bound is that of the "
+    "robot with the longest way. No controller can beat it, and where robots have to make way for each other it "
+    "cannot be reached.",
+    "Steps": "until all robots are within the tolerance of their goals at the same time. A run that does not arrive "
+    "counts with all the steps that it had.",
+    "Collisions": "robot with robot, robot with obstacle, a centre outside of the disk; looked for between the steps, "
+    "too.",
+    "Printed figures": DIFFERENCE,
+}
 
 
 def terminal_table(all_rows: Sequence[Row], title: str, printed: bool) -> rich.table.Table:
@@ -38,7 +50,7 @@ def terminal_table(all_rows: Sequence[Row], title: str, printed: bool) -> rich.t
             table.add_row(
                 place,
                 PRINTED,
-                f"{known.arrived}/120",
+                f"{known.arrived}/{PUBLISHED_RUNS}",
                 f"{known.mean:,.1f}",
                 f"{known.sd:,.0f}",
                 str(known.most),
@@ -76,46 +88,11 @@ def _gap(gap: float) -> str:
     return f"{gap:.1e}" if math.isfinite(gap) else "-"
 
 
-def _percent(share: Interval) -> str:
-    return f"{share.estimate:.1%} ({share.low:.1%} to {share.high:.1%})"
-
-
 def page(title: str, about: str, command: str, facts: list[tuple[str, str]], groups: Sequence[Sequence[Played]]) -> str:
     """Return a page with a section for each group of runs; in a group all controllers played the same runs."""
-    sections = [_section(group) for group in groups]
-    notes = blocks.Section(
-        "How to read this",
-        "notes",
-        [
-            blocks.Points(
-                [
-                    (
-                        "",
-                        "Bound",
-                        "every robot alone on its shortest way round the obstacles at full speed; the run's bound is "
-                        "that of the robot with the longest way. No controller can beat it, and where robots have to "
-                        "make way for each other it cannot be reached.",
-                    ),
-                    (
-                        "",
-                        "Steps",
-                        "until all robots are within the tolerance of their goals at the same time. A run that does not "
-                        "arrive counts with all the steps that it had.",
-                    ),
-                    (
-                        "",
-                        "Collisions",
-                        "robot with robot, robot with obstacle, a centre outside of the disk; looked for between "
-                        "the steps, too.",
-                    ),
-                    *(("", "Printed figures", text) for text in DIFFERENCES),
-                ]
-            )
-        ],
-    )
-    return page_text(
-        blocks.Document(title, "unit disk", about, blocks.Facts(facts), blocks.Command(command), [*sections, notes])
-    )
+    notes = blocks.Points([("", front, text) for front, text in NOTES.items()])
+    sections = [*(_section(group) for group in groups), blocks.Section("How to read this", "notes", [notes])]
+    return page_text(blocks.Document(title, "unit disk", about, blocks.Facts(facts), blocks.Command(command), sections))
 
 
 def _section(group: Sequence[Played]) -> blocks.Section:
@@ -131,56 +108,38 @@ def _section(group: Sequence[Played]) -> blocks.Section:
 
 
 def _figures(group: Sequence[Played]) -> blocks.Table:
-    header = [
-        "controller",
-        "map",
-        "arrived",
-        "95 % interval",
-        "mean ± sd",
-        "max",
-        "min",
-        "bound",
-        "mean / bound",
-        "collisions",
-        "smallest gaps",
-    ]
+    header = ["controller", "map", "arrived", "mean ± sd", "bound", "mean / bound", "collisions", "gaps"]
     rows = []
-    by_map = [rows_by_map(of) if len(of.problem.maps) <= 12 else rows_by_map(of)[-1:] for of in group]
-    places = [row.place for row in by_map[0]]
-    for k, place in enumerate(places):
-        if place in PUBLISHED and by_map[0][k].runs == 120:
-            known = PUBLISHED[place]
-            cells = [
-                PRINTED,
-                place,
-                f"{known.arrived}/120",
-                "",
-                f"{known.mean:,.2f} ± {known.sd:,.0f}",
-                str(known.most),
-                str(known.least),
-                "",
-                "",
-                "",
-                "",
-            ]
-            rows.append(blocks.Row([blocks.cell(text) for text in cells]))
-        for rows_of in by_map:
-            row = rows_of[k]
-            cells = [
-                row.controller,
-                place,
-                f"{row.arrived}/{row.runs}",
-                _percent(row.share),
-                f"{row.mean:,.1f} ± {row.sd:,.0f}",
-                str(row.most),
-                str(row.least),
-                f"{row.bound:,.1f}",
-                f"{row.ratio:.4f}",
-                _collisions(row),
-                f"{_gap(row.robot_gap)} / {_gap(row.obstacle_gap)}",
-            ]
-            rows.append(blocks.Row([blocks.cell(text) for text in cells], strong=place == "all"))
-    return blocks.Table("Steps until all have arrived", header, rows, "Gaps: between robots / to obstacles.")
+    by_map = [rows_by_map(of) if len(of.problem.maps) <= MOST_MAPS else rows_by_map(of)[-1:] for of in group]
+    for k, place in enumerate(row.place for row in by_map[0]):
+        if place in PUBLISHED and by_map[0][k].runs == PUBLISHED_RUNS:
+            rows.append(_printed(place))
+        rows += [_measured(rows_of[k]) for rows_of in by_map]
+    return blocks.Table(
+        "Steps until all have arrived", header, rows, "Gaps: the smallest between robots, to obstacles."
+    )
+
+
+def _printed(place: str) -> blocks.Row:
+    known = PUBLISHED[place]
+    mean = f"{known.mean:,.2f} ± {known.sd:,.0f}"
+    spread = f"{known.least} to {known.most}"
+    cells = [blocks.cell(text) for text in (PRINTED, place, f"{known.arrived}/{PUBLISHED_RUNS}")]
+    return blocks.Row([*cells, blocks.cell(mean, "", spread), *(blocks.cell("") for _ in range(4))])
+
+
+def _measured(row: Row) -> blocks.Row:
+    cells = [
+        blocks.cell(row.controller),
+        blocks.cell(row.place),
+        blocks.cell(f"{row.arrived}/{row.runs}", "", f"{row.share.low:.1%} to {row.share.high:.1%}"),
+        blocks.cell(f"{row.mean:,.1f} ± {row.sd:,.0f}", "", f"{row.least} to {row.most}"),
+        blocks.cell(f"{row.bound:,.1f}"),
+        blocks.cell(f"{row.ratio:.4f}"),
+        blocks.cell(_collisions(row)),
+        blocks.cell(_gap(row.robot_gap), "", _gap(row.obstacle_gap)),
+    ]
+    return blocks.Row(cells, strong=row.place == "all")
 
 
 def _collisions(row: Row) -> str:
