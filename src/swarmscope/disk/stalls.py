@@ -40,6 +40,10 @@ CLUSTER = 0.03
 """Ends nearer to each other than this are the same stall point."""
 
 
+TIGHT = 1e-6
+"""Points of the grid with a smaller gap than this count as barred: there a rounding error decides on contact."""
+
+
 class Situation(NamedTuple):
     """One robot that moves among others that do not."""
 
@@ -89,6 +93,7 @@ class Basins(NamedTuple):
     """Where one ends up from each point of a grid."""
 
     grid: FieldGrid
+    """The field that was followed; it was asked for with steps as the rules have them."""
     labels: Ints
     """(ny, nx): ARRIVES, BARRED, CIRCLES, TOUCHES, or k for ``stalls[k - 1]``."""
     ends: Floats
@@ -111,14 +116,17 @@ class WithPotential(Protocol):
 
 def field_on_grid(of: Situation, resolution: int = 61) -> FieldGrid:
     """Return the velocity at ``resolution`` by ``resolution`` points of the workspace, for a robot that stood still."""
-    x, free, state = _grid(of, resolution)
+    return _field(of, *_grid(of, resolution))
+
+
+def _field(of: Situation, axis: Floats, free: npt.NDArray[np.bool_], state: Floats) -> FieldGrid:
     velocity = np.full((*free.shape, 2), np.nan)
     if free.any():
         controller = _controller(of, len(state), 1)
         chosen = np.zeros(state.shape)
         controller.velocities(0, np.arange(len(state)), state, np.zeros(state.shape), chosen)
         velocity[free] = _cut(chosen[:, of.row])
-    return FieldGrid(x, x.copy(), velocity, free)
+    return FieldGrid(axis, axis.copy(), velocity, free)
 
 
 def has_potential(of: Situation) -> bool:
@@ -142,17 +150,18 @@ def potential_on_grid(of: Situation, resolution: int = 61) -> Floats:
     return values
 
 
-def basins(of: Situation, resolution: int = 41, coarse: float = 4.0, longest: float = 8.0) -> Basins:
+def basins(of: Situation, resolution: int = 41, coarse: float = 1.0, longest: float = 6.0) -> Basins:
     """Follow the field from every free point of a grid to its end.
 
     Args:
         of: who moves where.
         resolution: points of the grid along each axis.
-        coarse: length of a step, in steps of the rules; the controller is told that steps are that long.
+        coarse: length of a step, in steps of the rules; the controller is told that steps are that long. More than
+            1 is as much faster, but can lose what happens in small gaps (the report's controller circles at 1 only).
         longest: way [radii of the workspace] after which a robot is said to circle.
     """
-    grid = field_on_grid(of, resolution)
-    _, free, state = _grid(of, resolution)
+    axis, free, state = _grid(of, resolution)
+    grid = _field(of, axis, free, state)
     fate = _follow(of, state, coarse, longest) if free.any() else np.empty(0, dtype=np.int64)
     end = state[:, of.row]
     stalls, owner = _clusters(end[fate == 1])
@@ -165,7 +174,7 @@ def basins(of: Situation, resolution: int = 41, coarse: float = 4.0, longest: fl
 def describe(found: Basins) -> str:
     """Return in words what was found."""
     words = [f"{found.share(ARRIVES):.1%} of {int(found.grid.free.sum())} points lead to the goal"]
-    for label, what in ((CIRCLES, "circle"), (TOUCHES, "touch something")):
+    for label, what in ((CIRCLES, "circle"), (TOUCHES, "touch something or leave the disk")):
         if (found.labels == label).any():
             words.append(f"{found.share(label):.1%} {what}")
     count = len(found.stalls)
@@ -180,7 +189,7 @@ def _grid(of: Situation, resolution: int) -> tuple[Floats, npt.NDArray[np.bool_]
         raise ConfigError("resolution", f"{resolution} points make no grid")
     axis = np.linspace(-1.0, 1.0, resolution)
     points = np.stack(np.meshgrid(axis, axis), axis=-1)
-    free = (np.linalg.norm(points, axis=-1) <= 1.0) & (_least_gap(of, points) > 0.0)
+    free = (np.linalg.norm(points, axis=-1) <= 1.0) & (_least_gap(of, points) > TIGHT)
     count = int(free.sum())
     robots = points[free][:, None] if of.others is None else np.repeat(of.others[None], count, axis=0)
     robots = np.ascontiguousarray(robots, dtype=np.float64)

@@ -52,7 +52,7 @@ import numpy as np
 from swarmscope._jit import jit, jit_inner
 from swarmscope.disk import bounds, geodesic
 from swarmscope.disk.controllers._potential import attraction, obstruction
-from swarmscope.disk.rules import Floats, Ints
+from swarmscope.disk.rules import ROUNDING, Floats, Ints
 from swarmscope.disk.runs import Problem
 
 SUMMARY = "descends a navigation function of all robots: shortest ways against nearness, turned to pass each other"
@@ -114,24 +114,12 @@ class NavigationFunction:
         ways = geodesic.build([one.obstacles for one in problem.maps], (problem.rules.r + margins).tolist())
         self._ways = geodesic.add_goals(ways, field_map, field_goal)
         self._margin, self._map_of = margins, problem.map_of
-        self._pull = np.zeros((problem.rules.n, 4))
+        self._pull = np.zeros((problem.rules.n, 5))
 
     def velocities(self, step: int, alive: Ints, state: Floats, velocity: Floats, out: Floats) -> None:
         """Write the velocities (see ``Controller``)."""
-        _velocities(
-            alive,
-            state,
-            velocity,
-            self._ways,
-            self._field,
-            self._map_of,
-            self._margin,
-            self._rules.r,
-            self._rules.step,
-            self._params,
-            self._pull,
-            out,
-        )
+        _velocities(alive, state, velocity, self._ways, self._field, self._map_of, self._margin, self._rules.r,
+                    self._rules.step, self._params, self._pull, out)
 
     def potential(self, state: Floats, out: Floats) -> None:
         """Write log phi of each run into ``out`` (runs,): infinity where something touches."""
@@ -139,9 +127,8 @@ class NavigationFunction:
 
     def gradient(self, state: Floats, out: Floats) -> None:
         """Write the gradient of log phi by the positions into ``out`` (runs, n, 2)."""
-        _gradients(
-            state, self._ways, self._field, self._map_of, self._margin, self._rules.r, self._params, self._pull, out
-        )
+        _gradients(state, self._ways, self._field, self._map_of, self._margin, self._rules.r, self._params,
+                   self._pull, out)
 
 
 def create(problem: Problem, params: Params) -> NavigationFunction:
@@ -171,16 +158,19 @@ def widest_margins(problem: Problem) -> Floats:
 
 
 @jit_inner
-def _attractions(b: int, state: Floats, ways: geodesic.Ways, field: Ints, params: Params, pull: Floats) -> float:
-    """Write (ds/dV, direction, V) of each robot into ``pull`` and return gamma."""
+def _attractions(
+    b: int, state: Floats, ways: geodesic.Ways, field: Ints, params: Params, pull: Floats
+) -> float:
+    """Write (ds/dV, direction, V, disc that the way makes for or -1) of each robot into ``pull``, return gamma."""
     gamma = 0.0
     for i in range(state.shape[1]):
-        way, dx, dy, _ = geodesic.look_up(ways, field[b, i], state[b, i, 0], state[b, i, 1])
+        way, dx, dy, slot = geodesic.look_up(ways, field[b, i], state[b, i, 0], state[b, i, 1])
         if not way < math.inf:
             way, dx, dy = 2.0, 0.0, 0.0
         value, slope = attraction(way, params.power, params.smooth)
         gamma += value
         pull[i, 0], pull[i, 1], pull[i, 2], pull[i, 3] = slope, dx, dy, way
+        pull[i, 4] = slot // 2 if slot >= 0 else -1
     return max(gamma, 1e-12)
 
 
@@ -201,10 +191,13 @@ def _descent(
     """Return minus the gradient of log phi by robot i's position, and how far it may move without touching.
 
     force is k / gamma. The room is below SHARE of the gap to each robot, and below the gap to each obstacle;
-    those too far to be met within ``stride`` are left out.
+    those too far to be met within ``stride`` are left out. In a crevice where margins overlap, a way found from
+    inside may begin into one of them; then the pull is left out, and the pushes alone lead out of the crevice.
     """
     x, y = state[b, i, 0], state[b, i, 1]
-    fx, fy = force * pull[i, 0] * pull[i, 1], force * pull[i, 0] * pull[i, 2]
+    fx = fy = 0.0
+    inwards = False
+    fall = 1.0
     room = math.inf
     reach = params.reach * r
     look = 2.0 * r + max(reach, 3.0 * stride)
@@ -229,6 +222,13 @@ def _descent(
             _, push = obstruction(gap, margin)
             fx += push * px / apart
             fy += push * py / apart
+            if gap < margin and pull[i, 4] == m:
+                # Inside the margin V is the length along its edge, which is longer by that than where the robot is.
+                fall = rho / apart
+            inwards = inwards or (gap < margin and px * pull[i, 1] + py * pull[i, 2] < -ROUNDING)
+    if not inwards:
+        fx += force * fall * pull[i, 0] * pull[i, 1]
+        fy += force * fall * pull[i, 0] * pull[i, 2]
     return fx, fy, room
 
 
