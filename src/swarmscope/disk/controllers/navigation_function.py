@@ -118,8 +118,20 @@ class NavigationFunction:
 
     def velocities(self, step: int, alive: Ints, state: Floats, velocity: Floats, out: Floats) -> None:
         """Write the velocities (see ``Controller``)."""
-        _velocities(alive, state, velocity, self._ways, self._field, self._map_of, self._margin, self._rules.r,
-                    self._rules.step, self._params, self._pull, out)
+        _velocities(
+            alive,
+            state,
+            velocity,
+            self._ways,
+            self._field,
+            self._map_of,
+            self._margin,
+            self._rules.r,
+            self._rules.step,
+            self._params,
+            self._pull,
+            out,
+        )
 
     def potential(self, state: Floats, out: Floats) -> None:
         """Write log phi of each run into ``out`` (runs,): infinity where something touches."""
@@ -127,8 +139,9 @@ class NavigationFunction:
 
     def gradient(self, state: Floats, out: Floats) -> None:
         """Write the gradient of log phi by the positions into ``out`` (runs, n, 2)."""
-        _gradients(state, self._ways, self._field, self._map_of, self._margin, self._rules.r, self._params,
-                   self._pull, out)
+        _gradients(
+            state, self._ways, self._field, self._map_of, self._margin, self._rules.r, self._params, self._pull, out
+        )
 
 
 def create(problem: Problem, params: Params) -> NavigationFunction:
@@ -158,9 +171,7 @@ def widest_margins(problem: Problem) -> Floats:
 
 
 @jit_inner
-def _attractions(
-    b: int, state: Floats, ways: geodesic.Ways, field: Ints, params: Params, pull: Floats
-) -> float:
+def _attractions(b: int, state: Floats, ways: geodesic.Ways, field: Ints, params: Params, pull: Floats) -> float:
     """Write (ds/dV, direction, V, disc that the way makes for or -1) of each robot into ``pull``, return gamma."""
     gamma = 0.0
     for i in range(state.shape[1]):
