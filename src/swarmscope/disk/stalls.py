@@ -32,10 +32,12 @@ from swarmscope.errors import ConfigError
 
 ARRIVES, BARRED, CIRCLES, TOUCHES = 0, -1, -2, -3
 """Labels of basins besides 1, 2, ... of the stall points: an end at the goal, no free point, and two bad ends."""
-WINDOW = 100
-"""Steps over which a robot has to get somewhere."""
-PROGRESS = 0.2
+WINDOW = 1000
+"""Steps over which a robot has to get somewhere: near an unstable equilibrium it is slow for some hundreds."""
+PROGRESS = 0.05
 """A robot that stays within this part of the way it could go in a window stalls."""
+FILMED = 20
+"""Steps between two points of a path."""
 CLUSTER = 0.03
 """Ends nearer to each other than this are the same stall point."""
 
@@ -171,6 +173,15 @@ def basins(of: Situation, resolution: int = 41, coarse: float = 1.0, longest: fl
     return Basins(grid, labels, ends, stalls)
 
 
+def paths(of: Situation, resolution: int = 15, coarse: float = 1.0, longest: float = 3.0) -> list[Floats]:
+    """Return where the robot goes from each free point of a grid, as points (k, 2)."""
+    _, free, state = _grid(of, resolution)
+    film: list[Floats] = []
+    if free.any():
+        _follow(of, state, coarse, longest, film)
+    return list(np.array([*film, state[:, of.row]]).transpose(1, 0, 2))
+
+
 def describe(found: Basins) -> str:
     """Return in words what was found."""
     words = [f"{found.share(ARRIVES):.1%} of {int(found.grid.free.sum())} points lead to the goal"]
@@ -221,8 +232,12 @@ def _controller(of: Situation, runs: int, coarse: float) -> Controller:
     return of.kind.create(alone, of.kind.params)
 
 
-def _follow(of: Situation, state: Floats, coarse: float, longest: float) -> Ints:
-    """Move the robot in every state to its end, in place; return ARRIVES, CIRCLES, TOUCHES, or 1 for a stall."""
+def _follow(of: Situation, state: Floats, coarse: float, longest: float, film: list[Floats] | None = None) -> Ints:
+    """Move the robot in every state to its end, in place; return ARRIVES, CIRCLES, TOUCHES, or 1 for a stall.
+
+    Positions are put into ``film`` now and then if it is given.
+    """
+    window = max(10, round(WINDOW / coarse))
     controller = _controller(of, len(state), coarse)
     step, row = coarse * of.rules.step, of.row
     velocity, chosen = np.zeros(state.shape), np.zeros(state.shape)
@@ -230,6 +245,8 @@ def _follow(of: Situation, state: Floats, coarse: float, longest: float) -> Ints
     alive = np.arange(len(state))
     anchor, spread = state[:, row].copy(), np.zeros(len(state))
     for done in range(math.ceil(longest / step)):
+        if film is not None and done % FILMED == 0:
+            film.append(state[:, row].copy())
         away = np.linalg.norm(state[alive, row] - of.goal, axis=1)
         arrived = away <= max(of.rules.tol, step)
         fate[alive[arrived]] = ARRIVES
@@ -245,8 +262,8 @@ def _follow(of: Situation, state: Floats, coarse: float, longest: float) -> Ints
         fate[alive[touches]] = TOUCHES
         spread[alive] = np.maximum(spread[alive], np.linalg.norm(now - anchor[alive], axis=1))
         stuck = np.zeros(len(alive), dtype=bool)
-        if done % WINDOW == WINDOW - 1:
-            stuck = (spread[alive] < PROGRESS * WINDOW * step) & ~touches
+        if done % window == window - 1:
+            stuck = (spread[alive] < PROGRESS * window * step) & ~touches
             fate[alive[stuck]] = 1
             anchor[alive], spread[alive] = now, 0.0
         alive = alive[~(touches | stuck)]
