@@ -42,8 +42,9 @@ def test_random_cases_arrive_without_contact():
     for n in (5, 12):
         scaled = rules.scaled(n)
         cases = [random_maps.random_map(seed, scaled) for seed in (20026, 20094)]
-        of = runs.Problem(scaled, tuple(case.map for case in cases), np.arange(2),
-                          np.array([case.permutation for case in cases]))
+        of = runs.Problem(
+            scaled, tuple(case.map for case in cases), np.arange(2), np.array([case.permutation for case in cases])
+        )
         kind = find("planned", {"attempts": 1, "iterations": 20, "sweeps": 200, "finish": 0})
         outcome = runs.play(of, kind.create(of, kind.params))
         assert outcome.status.tolist() == [runs.ARRIVED] * 2

@@ -135,7 +135,7 @@ def compare(first: Played, second: Played) -> PairedDifference:
 def failures(of: Played) -> list[tuple[str, str, str]]:
     """Return map, permutation and what happened of every run that did not arrive."""
     return [
-        (of.problem.maps[of.problem.map_of[b]].name, _permutation(of.problem, b), ended_words(of, int(b)))
+        (of.problem.maps[of.problem.map_of[b]].name, _permutation(of.problem, int(b)), ended_words(of, int(b)))
         for b in np.flatnonzero(of.outcome.status != ARRIVED)
     ]
 

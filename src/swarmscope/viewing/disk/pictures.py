@@ -82,7 +82,7 @@ def _draw_paths(axes: Axes, of: Problem, b: int, outcome: Outcome, film: Film) -
         _disc(axes, where[-1, k], rules.r, facecolor=colour, alpha=0.3, edgecolor=colour, lw=1.0, zorder=4)
         if rules.n <= 10:
             out = of.start[b, k] * 1.05
-            axes.text(*out, str(k), color=colour, fontsize=10, ha="center", va="center", weight="bold")
+            axes.text(float(out[0]), float(out[1]), str(k), color=colour, fontsize=10, ha="center", va="center", weight="bold")
     if outcome.status[b] in COLLISIONS:
         x, y = where[-1, outcome.involved[b, 0]]
         axes.plot(x, y, "X", ms=13, color=CRASH, mec="white", mew=1.2, zorder=8)
@@ -142,9 +142,10 @@ def field_png(situation: Situation, resolution: int = 61, found: Basins | None =
             axes.plot(stall.x, stall.y, "o", ms=11, mfc="white", mec=STUCK, mew=2.6, zorder=7)
         colour = robot_colour(situation.robot)
         axes.plot(*situation.goal, "X", ms=13, color=colour, mec="white", zorder=8)
-        for k in range(situation.rules.n) if situation.others is not None else ():
-            if k != situation.robot:
-                _disc(axes, situation.others[k], situation.rules.r, facecolor=robot_colour(k), alpha=0.6, zorder=6)
+        if situation.others is not None:
+            for k, place in enumerate(situation.others):
+                if k != situation.robot:
+                    _disc(axes, place, situation.rules.r, facecolor=robot_colour(k), alpha=0.6, zorder=6)
         _field_legend(axes, found, potential is not None)
         others = "alone" if situation.others is None else "the others stand"
         arrive = found.share(0)
