@@ -8,7 +8,15 @@ import time
 from pathlib import Path
 
 HERE = Path(__file__).parent
-SCRIPTS = ("bench_step.py", "bench_world.py", "bench_lidar.py", "bench_paths.py", "bench_runs.py", "bench_store.py", "bench_disk.py")
+SCRIPTS = (
+    "bench_step.py",
+    "bench_world.py",
+    "bench_lidar.py",
+    "bench_paths.py",
+    "bench_runs.py",
+    "bench_store.py",
+    "bench_disk.py",
+)
 
 
 def help_s() -> tuple[float, float]:

@@ -31,6 +31,8 @@ SOLID, SOLID_EDGE = "#c9d2c4", "#a4b19d"
 CRASH = "#c23b22"
 ROBOTS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#b8860b", "#56b4e9", "#5b5b5b", "#7a3ea8", "#8c510a", "#1b7837")
 """Colours that stay apart for colour-blind people; robot k has the same in every picture and page."""
+MANY = 20
+"""More robots than that are drawn thinner and without their shortest ways."""
 TRACE_STEP = 0.004
 LEVELS = 22
 STUCK, ROUND_AND_ROUND, TOUCHING = "#d55e00", "#cc79a7", "#7a3ea8"
@@ -71,18 +73,18 @@ def _draw_paths(axes: Axes, of: Problem, b: int, outcome: Outcome, film: Film) -
     rules, place = of.rules, of.maps[of.map_of[b]]
     _draw_place(axes, place, rules.r)
     where = np.array([picture[b] for picture in film.positions])
-    thin = 1.6 if rules.n <= 20 else 0.7
-    for k, way in enumerate(_shortest_ways(of, b)):
+    thin = 1.6 if rules.n <= MANY else 0.7
+    for k, way in enumerate(_shortest_ways(of, b) if rules.n <= MANY else ()):
         axes.plot(way[:, 0], way[:, 1], color=robot_colour(k), lw=0.8, ls=(0, (1, 2.5)), alpha=0.8, zorder=2)
     for k in range(rules.n):
         colour = robot_colour(k)
         axes.plot(where[:, k, 0], where[:, k, 1], color=colour, lw=thin, solid_joinstyle="round", zorder=3)
-        axes.plot(*of.start[b, k], "o", ms=4 if rules.n <= 20 else 2, color=colour, zorder=4)
-        axes.plot(*of.goal[b, k], "x", ms=7 if rules.n <= 20 else 3, mew=1.6, color=colour, zorder=5)
+        axes.plot(*of.start[b, k], "o", ms=4 if rules.n <= MANY else 2, color=colour, zorder=4)
+        axes.plot(*of.goal[b, k], "x", ms=7 if rules.n <= MANY else 3, mew=1.6, color=colour, zorder=5)
         _disc(axes, where[-1, k], rules.r, facecolor=colour, alpha=0.3, edgecolor=colour, lw=1.0, zorder=4)
         if rules.n <= 10:
-            out = of.start[b, k] * 1.05
-            axes.text(float(out[0]), float(out[1]), str(k), color=colour, fontsize=10, ha="center", va="center", weight="bold")
+            x, y = (float(part) * 1.05 for part in of.start[b, k])
+            axes.text(x, y, str(k), color=colour, fontsize=10, ha="center", va="center", weight="bold")
     if outcome.status[b] in COLLISIONS:
         x, y = where[-1, outcome.involved[b, 0]]
         axes.plot(x, y, "X", ms=13, color=CRASH, mec="white", mew=1.2, zorder=8)
@@ -109,7 +111,7 @@ def clearance_png(of: Problem, b: int, outcome: Outcome, film: Film, label: str)
         axes.axhline(rules.r, color=FAINT, lw=0.8, ls=":")
         axes.text(step[-1] * 0.005, rules.r, "a robot's radius", color=FAINT, fontsize=8, ha="left", va="bottom")
         foot = axes.get_xaxis_transform()
-        for k in np.flatnonzero(outcome.arrival[b] >= 0) if rules.n <= 20 else ():
+        for k in np.flatnonzero(outcome.arrival[b] >= 0) if rules.n <= MANY else ():
             axes.plot(outcome.arrival[b, k], 0.02, "^", color=robot_colour(int(k)), ms=7, transform=foot, clip_on=False)
         if rules.n > 1 or len(discs):
             figure.legend(loc="upper right", bbox_to_anchor=(0.985, 0.97), ncols=2, frameon=False, fontsize=9)
@@ -262,7 +264,8 @@ def _gaps(where: Floats, discs: Floats, r: float) -> tuple[Floats, Floats]:
 def _run_words(of: Problem, b: int, outcome: Outcome, bound: int) -> str:
     ended = STATUS_WORDS[outcome.status[b]]
     ratio = f", {outcome.steps[b] / bound:.3f} of the bound {bound}" if ended == "arrived" else f" (bound {bound})"
-    return f"{_permutation_words(of, b)}: {ended}, {outcome.steps[b]} steps{ratio}; dots: shortest ways"
+    dots = "; dots: shortest ways" if of.rules.n <= MANY else ""
+    return f"{_permutation_words(of, b)}: {ended}, {outcome.steps[b]} steps{ratio}{dots}"
 
 
 def _permutation_words(of: Problem, b: int) -> str:
