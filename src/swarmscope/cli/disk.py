@@ -61,6 +61,9 @@ def run_command(
             stem = file_stem(one.label)
             contents[f"{stem}.png"] = pictures.trajectories_png(of, 0, one.outcome, film, one.label, int(least[0]))
             contents[f"{stem}-clearance.png"] = pictures.clearance_png(of, 0, one.outcome, film, one.label)
+        if len(choices) > 1:
+            side = [(one.label, one.outcome, film) for one, film in zip(all_played, films, strict=True)]
+            contents["side-by-side.png"] = pictures.paths_side_by_side_png(of, 0, side, int(least[0]))
         shown = [replay.Shown(one.label, one.outcome, film) for one, film in zip(all_played, films, strict=True)]
         contents["replay.html"] = replay.replay_page(of, shown, int(least[0])).encode()
     of_permutation = "".join(str(k) for k in of.permutation[0]) if of.rules.n <= 10 else "many"
