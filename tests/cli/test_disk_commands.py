@@ -91,6 +91,7 @@ def test_the_list_says_what_each_knows_and_guarantees():
         (("table", "report:obstacle_buffer"), "not KEY=VALUE"),
         (("random", "--seeds", "nothing"), "nothing"),
         (("field", "report", "--robot", "5"), "no robot 5"),
+        (("field", "planned"), "has no field"),
     ],
 )
 def test_what_cannot_be_done_is_told(words, why, tmp_path, monkeypatch):

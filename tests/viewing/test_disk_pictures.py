@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from swarmscope.disk import bounds, controllers, maps, rules, runs
-from swarmscope.disk.stalls import Situation
+from swarmscope.disk.stalls import Situation, basins
 from swarmscope.viewing.disk import pictures
 
 
@@ -67,7 +67,7 @@ def test_shortest_ways_end_at_the_goals():
 def test_the_field_shows_equipotentials_where_there_is_a_potential_and_circling_where_it_is():
     def picture(name):
         situation = Situation(controllers.find(name), maps.NAMED["minima"], rules.Rules(), (0, 1, 2, 4, 3), 2, None)
-        return image(pictures.field_png(situation, resolution=61))
+        return image(pictures.field_png(situation, basins(situation, 61)))
 
     smooth, report = picture("navigation-function"), picture("report")
     green = (smooth[..., 1] > smooth[..., 0] + 40) & (smooth[..., 1] > smooth[..., 2] + 40)

@@ -35,6 +35,8 @@ from swarmscope.viewing.report.publish import put_in_place
 SHOWN_FAILURES = 8
 PICTURES = 1500
 """A film has about so many pictures."""
+FIELD_POINTS, USER_POINTS, USER_COARSE = 61, 21, 4.0
+"""Points along each side of a field, and steps between two looks at it."""
 SLOW_S = 300.0
 """A user's controller that will take longer gets a note."""
 
@@ -128,20 +130,25 @@ def random_command(
 
 
 def field_command(
-    name: str, map_: str, permutation: str | None, robot: int, alone: bool, resolution: int, out: Path | None
+    name: str, map_: str, permutation: str | None, robot: int, alone: bool, resolution: int | None, out: Path | None
 ) -> None:
     """Draw the field of one robot's velocities, and say where robots get stuck in it."""
     from swarmscope.viewing.disk import pictures
 
     choice = read_choice(name)
+    if choice.name == "planned":
+        raise ConfigError(name, "follows a plan in time, so it has no field; draw another, or a run of it")
     of = one_problem(map_, permutation, None, None)
     if not 0 <= robot < of.rules.n:
         raise ConfigError("robot", f"there is no robot {robot}; they are 0 to {of.rules.n - 1}")
     others = None if alone else of.start[0]
     situation = Situation(choice.kind(), of.maps[0], of.rules, tuple(of.permutation[0].tolist()), robot, others)
     with waiting(f"field of {choice.label} on {of.maps[0].name}"):
-        print(describe(basins(situation, resolution)))
-        picture = pictures.field_png(situation, resolution=resolution)
+        # A user's Python is called for every point and step: fewer of both.
+        points, coarse = (USER_POINTS, USER_COARSE) if choice.file else (FIELD_POINTS, 1.0)
+        found = basins(situation, resolution or points, coarse)
+        print(describe(found))
+        picture = pictures.field_png(situation, found, coarse)
     place = out or Path("runs") / "disk" / f"field-{file_stem(choice.label)}-{file_stem(of.maps[0].name)}-{robot}.png"
     put_in_place(place.parent, {place.name: picture})
     print(place)

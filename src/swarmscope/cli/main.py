@@ -302,7 +302,7 @@ def disk_field(
     alone: Annotated[
         bool, typer.Option("--alone", help="Without the others, which else stand at their starts.")
     ] = False,
-    resolution: Annotated[int, typer.Option(min=5, max=401, help="Points along each side.")] = 61,
+    resolution: Annotated[int | None, typer.Option(min=5, max=401, help="Points along each side.")] = None,
     out: Annotated[Path | None, typer.Option(help="PNG file.")] = None,
 ) -> None:
     """Draw where a robot would go from anywhere, and where it would get stuck."""

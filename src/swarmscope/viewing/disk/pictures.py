@@ -17,7 +17,6 @@ from swarmscope.disk.stalls import (
     TOUCHES,
     Basins,
     Situation,
-    basins,
     has_potential,
     paths,
     potential_on_grid,
@@ -34,7 +33,7 @@ ROBOTS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#b8860b", "#56b4e9", "#5b
 MANY = 20
 """More robots than that are drawn thinner and without their shortest ways."""
 TRACE_STEP = 0.004
-LEVELS = 22
+LEVELS, POTENTIAL_POINTS = 22, 121
 STUCK, ROUND_AND_ROUND, TOUCHING = "#d55e00", "#cc79a7", "#7a3ea8"
 
 
@@ -124,14 +123,13 @@ def clearance_png(of: Problem, b: int, outcome: Outcome, film: Film, label: str)
     return _png(draw, (8.6, 4.6))
 
 
-def field_png(situation: Situation, resolution: int = 61, found: Basins | None = None) -> bytes:
+def field_png(situation: Situation, found: Basins, coarse: float = 1.0) -> bytes:
     """Return the field of one robot's velocities as PNG: where it goes from anywhere, and where it gets stuck.
 
-    Equipotentials are drawn where the controller has a potential.
+    Equipotentials are drawn where the controller has a potential. ``coarse`` is as in ``stalls.basins``.
     """
-    found = found or basins(situation, resolution)
-    followed = paths(situation)
-    potential = potential_on_grid(situation, max(resolution, 121)) if has_potential(situation) else None
+    followed = paths(situation, coarse=coarse)
+    potential = potential_on_grid(situation, POTENTIAL_POINTS) if has_potential(situation) else None
 
     def draw(figure: Any) -> None:
         axes = figure.add_axes((0.02, 0.075, 0.96, 0.815))
