@@ -18,10 +18,10 @@ from swarmscope.evaluation.sides import cost_to_go
 from swarmscope.sim.advice import blocked_stretch, side_of_way, start_cell
 from swarmscope.tasks._occupancy import Raster, free_cells_near
 
-SNAP_CELLS = 6
+SNAP_CELLS = 4
 """A goal in a blocked cell counts as in the free one nearest to it, at most so many cells away."""
 TIE_M = 0.1
-"""With less than this between the best ways on both sides there is no label: two cells."""
+"""With less than this between the best ways on both sides there is no label."""
 FARTHEST_M = 20.0
 """A detour is counted up to here."""
 UNREACHABLE, NOTHING_AHEAD, TIE, LABELLED = range(4)

@@ -28,7 +28,7 @@ from swarmscope.onboard.planning import dh_bug
 from swarmscope.onboard.planning._giwt_graph import GRID_M
 from swarmscope.sim.lidar import Beams, make_beams
 from swarmscope.sim.loop import run
-from swarmscope.sim.world import WorldSpec, compile_world
+from swarmscope.sim.world import World, compile_world
 from swarmscope.tasks import Setup
 from swarmscope.tasks._giwt_maps import SIZE_M, MapOptions, draw_map
 from swarmscope.tasks._occupancy import Raster, centres_of, rasterise
@@ -44,7 +44,8 @@ COLUMN_M = (0.7, 11.0)
 LIMIT_S = 90.0
 """Length of a driven run."""
 TRIES = 3000
-RESOLUTION_M = 0.05
+RESOLUTION_M = 0.1
+"""Of the grid that ways are searched on; 0.05 m gives the same side in 99.8 % of the cases and takes six times as long."""
 
 Floats = NDArray[np.float64]
 Sampling = Literal["placed", "driven"]
@@ -97,9 +98,9 @@ def samples_of(kind: str, task: str, sampling: Sampling, seed: int, counts: Coun
     if sampling == "driven":
         yield from _driven(rng, options, task, counts)
         return
-    world = draw_map(rng, options, np.zeros((0, 2)), 0.0)
+    world = compile_world(draw_map(rng, options, np.zeros((0, 2)), 0.0))
     _, _, _, keeps_off, _ = robot()
-    raster = rasterise(compile_world(world), keeps_off, (0.0, 0.0, SIZE_M, SIZE_M), RESOLUTION_M)
+    raster = rasterise(world, keeps_off, (0.0, 0.0, SIZE_M, SIZE_M), RESOLUTION_M)
     free = np.argwhere(raster.blocked == 0)
     if not len(free):
         return
@@ -137,10 +138,10 @@ def _column(rng: np.random.Generator, raster: Raster) -> tuple[Floats, Floats]:
     return places[free], goals[free]
 
 
-def _placed(world: WorldSpec, raster: Raster, places: Floats, goals: Floats, counts: Counts) -> Iterator[Sample]:
+def _placed(world: World, raster: Raster, places: Floats, goals: Floats, counts: Counts) -> Iterator[Sample]:
     """Yield the samples of robots that stand."""
     _, beams, rig, _, horizon = robot()
-    views = look(compile_world(world), places, goals, beams, rig)
+    views = look(world, places, goals, beams, rig)
     counts["looked_at"] += len(places)
     counts["clear_ahead"] += int((~views.blocked).sum())
     for i in np.flatnonzero(views.blocked):
