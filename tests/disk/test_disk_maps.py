@@ -36,6 +36,11 @@ def test_a_map_is_read_from_a_file(tmp_path):
         ("obstacles: [{center: [0, 0]}]", "obstacles.0. has to hold"),
         ("obstacles: [", "is not YAML"),
         ("discs: []", "nothing else"),
+        ("obstacles: 2026-13-45", "is not YAML: month"),
+        (f"obstacles: {'9' * 5000}", "is not YAML"),
+        ("[" * 3000, "is not a map"),
+        ("obstacles: [{center: '12', radius: 0.1}]", "two numbers"),
+        (f"obstacles: [{{center: [0, 0], radius: {'9' * 400}}}]", "two numbers"),
     ],
 )
 def test_files_that_are_no_maps_are_refused(tmp_path, text, why):

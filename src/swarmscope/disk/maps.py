@@ -96,8 +96,10 @@ def read_map(path: Path) -> DiskMap:
         content = yaml.safe_load(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise InputFileError(path, error.strerror or "cannot be read") from None
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
+    except (yaml.YAMLError, ValueError) as error:  # ValueError: no UTF-8, a date or a number that there is not
         raise InputFileError(path, f"is not YAML: {' '.join(str(error).split())}") from None
+    except RecursionError:
+        raise InputFileError(path, "is not a map: brackets in brackets in brackets") from None
     if not isinstance(content, Mapping) or set(content) - {"obstacles", "name", "about"}:
         raise InputFileError(path, "has to hold 'obstacles' (and may hold 'name' and 'about'), nothing else")
     entries = content.get("obstacles")
@@ -113,10 +115,13 @@ def _obstacle(path: Path, k: int, entry: Any) -> tuple[float, float, float]:
     where = f"obstacles[{k}]"
     if not isinstance(entry, Mapping) or set(entry) != {"center", "radius"}:
         raise InputFileError(path, f"{where} has to hold 'center' and 'radius'")
+    center = entry["center"]
     try:
-        x, y = (float(part) for part in entry["center"])
+        if not isinstance(center, list):
+            raise TypeError
+        x, y = (float(part) for part in center)
         radius = float(entry["radius"])
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputFileError(path, f"{where}: 'center' has to be two numbers, 'radius' one") from None
     if not np.isfinite([x, y, radius]).all() or radius <= 0.0:
         raise InputFileError(path, f"{where}: numbers have to be finite and the radius above 0")
