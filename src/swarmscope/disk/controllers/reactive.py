@@ -44,6 +44,8 @@ GUARANTEES = (
     "circle, but a robot can be kept from its goal by others that stand for good"
 )
 
+LIMITS = {"horizon": (1e-3, 1000.0), "stride": (0.05, 1000.0), "gain": (1e-3, 0.999), "margin": (0.0, 1.0)}
+
 TURNS_DEG = (3, 6, 9, 12, 16, 20, 25, 30, 40, 50, 60, 75, 90, 110, 135, 160)
 LENGTHS = (1.0, 2.0, 4.0, 8.0)
 WAITS = (0.2, 0.4, 0.8, 1.4, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0)
