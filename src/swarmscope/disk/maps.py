@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from swarmscope.disk.rules import Floats
+from swarmscope.disk.rules import Floats, Rules
 from swarmscope.errors import ConfigError, InputFileError, UnknownNameError
 
 MOST_OBSTACLES = 200
@@ -65,8 +65,8 @@ EMPTY = _map("empty", "no obstacle")
 NAMED = REPORT_MAPS | {EMPTY.name: EMPTY}
 
 
-def find_map(name: str, n: int) -> DiskMap:
-    """Return the map of that name, 'random:SEED' for n robots, or the one in that YAML file.
+def find_map(name: str, rules: Rules) -> DiskMap:
+    """Return the map of that name, 'random:SEED' for robots of these rules, or the one in that YAML file.
 
     Errors: UnknownNameError, InputFileError, ConfigError.
     """
@@ -74,9 +74,8 @@ def find_map(name: str, n: int) -> DiskMap:
         return NAMED[name]
     if name.startswith("random:"):
         from swarmscope.disk.random_maps import random_map
-        from swarmscope.disk.rules import scaled
 
-        return random_map(seed_of(name), scaled(n)).map
+        return random_map(seed_of(name), rules).map
     if Path(name).suffix in {".yaml", ".yml", ".json"}:
         return read_map(Path(name))
     raise UnknownNameError("map", name, [*NAMED, "random:SEED", "FILE.yaml"])
