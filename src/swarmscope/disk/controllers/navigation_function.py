@@ -58,8 +58,9 @@ from swarmscope.disk.runs import Problem
 SUMMARY = "descends a navigation function of all robots: shortest ways against nearness, turned to pass each other"
 KNOWS = "all positions and goals, what the others did in the last step, all obstacles"
 GUARANTEES = (
-    "never a collision, in discrete time and from any free state; a robot alone always arrives; together the potential "
-    "falls (short steps), but may have minima besides the goals: next to walls, in passages for one, in a throng"
+    "never a collision, in discrete time and from any free state; a robot alone always arrives, if the way leaves it "
+    "0.0001 on both sides; together the potential falls (short steps), but may have minima besides the goals: next to "
+    "walls, in passages for one, in a throng"
 )
 
 LIMITS = {
