@@ -33,6 +33,7 @@ def test_a_map_is_read_from_a_file(tmp_path):
         ("obstacles: [{center: [0], radius: 1}]", "two numbers"),
         ("obstacles: [{center: [0, .nan], radius: 1}]", "finite"),
         ("obstacles: [{center: [0, 0], radius: -1}]", "above 0"),
+        ("obstacles: [{center: [1.0e+200, 0], radius: 1}]", "the disk has radius 1"),
         ("obstacles: [{center: [0, 0]}]", "obstacles.0. has to hold"),
         ("obstacles: [", "is not YAML"),
         ("discs: []", "nothing else"),

@@ -14,6 +14,8 @@ from swarmscope.disk.rules import Floats, Rules
 from swarmscope.errors import ConfigError, InputFileError, UnknownNameError
 
 MOST_OBSTACLES = 200
+FARTHEST = 100.0
+"""Largest coordinate and radius in a file."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,4 +126,6 @@ def _obstacle(path: Path, k: int, entry: Any) -> tuple[float, float, float]:
         raise InputFileError(path, f"{where}: 'center' has to be two numbers, 'radius' one") from None
     if not np.isfinite([x, y, radius]).all() or radius <= 0.0:
         raise InputFileError(path, f"{where}: numbers have to be finite and the radius above 0")
+    if max(abs(x), abs(y), radius) > FARTHEST:
+        raise InputFileError(path, f"{where}: the disk has radius 1; numbers above {FARTHEST:g} are taken for a slip")
     return x, y, radius
