@@ -9,8 +9,9 @@ A control-barrier-function program in discrete time. Its constraints are half pl
 * the rim, which is not convex seen from inside: ``room = sqrt(1 - s^2) - |x|`` for steps of length s.
 
 All in lengths per step. Standing still obeys the first two always, so the program is never infeasible for them; where
-the rim's constraint makes it so, or leaves only what is too fast, the robot stands, which cannot collide either. So from a start without contact
-there is no contact in any step nor between steps, whatever the wishes, if all robots obey this.
+the rim's constraint makes it so, or leaves only what is too fast, the robot stands, which cannot collide either. So
+from a start without contact there is no contact in any step nor between steps, whatever the wishes, if all robots obey
+this.
 """
 
 from __future__ import annotations

@@ -65,7 +65,8 @@ def paths_side_by_side_png(of: Problem, b: int, runs: Sequence[tuple[str, Outcom
             words = STATUS_WORDS[outcome.status[b]]
             axes.set_title(f"{label}: {words}, {outcome.steps[b]} steps", fontsize=11, color=INK, loc="left", **PLAIN)
         name, permutation = of.maps[of.map_of[b]].name, _permutation_words(of, b)
-        figure.text(0.012, 0.95, f"{name}, {permutation}; bound {bound} steps", fontsize=12, color=INK, weight="bold", **PLAIN)
+        title = f"{name}, {permutation}; bound {bound} steps"
+        figure.text(0.012, 0.95, title, fontsize=12, color=INK, weight="bold", **PLAIN)
 
     return _png(draw, (5.2 * len(runs), 6.0))
 
