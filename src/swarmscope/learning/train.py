@@ -176,14 +176,14 @@ def _epoch(
         loss = (functional.cross_entropy(logits, classes, reduction="none") * weights).sum() / weights.sum()
         if not bool(torch.isfinite(loss)):
             raise SwarmscopeError(
-                f"the loss is {float(loss)} in epoch {epoch + 1}, batch {step + 1}: lower learning_rate; "
+                f"the loss is {loss.item()} in epoch {epoch + 1}, batch {step + 1}: lower learning_rate; "
                 "the checkpoint of the epoch before is kept"
             )
         optimizer.zero_grad(set_to_none=True)
         loss.backward()  # type: ignore[no-untyped-call]
         torch.nn.utils.clip_grad_norm_(model.parameters(), LARGEST_GRADIENT)
         optimizer.step()
-        loss_sum += float(loss) * len(classes)
+        loss_sum += loss.item() * len(classes)
         right += int((logits.argmax(1) == classes).sum())
         seen += len(classes)
         if report is not None:

@@ -1,0 +1,135 @@
+"""Shards: what goes in comes out; torn, changed, foreign and missing files are named; stopping loses nothing."""
+
+import json
+
+import numpy as np
+import pytest
+
+from swarmscope.errors import ConfigError, InputFileError
+from swarmscope.learning.generate import generate, make_shard, parse_set, totals, verify
+from swarmscope.learning.records import (
+    MANIFEST,
+    SCHEMA,
+    concatenate,
+    load,
+    read_shard,
+    select,
+    split_of,
+    to_bytes,
+)
+from swarmscope.learning.scenes import Counts, samples_of
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    place = tmp_path_factory.mktemp("data")
+    generate(place, ["B-II", "A-I-driven"], 300, workers=2)
+    return place
+
+
+def test_sets_are_large_enough_whole_and_described(folder):
+    manifest = verify(folder)
+    for name, row in totals(manifest).items():
+        shard = load(folder)[name]
+        assert row["samples"] == shard.samples >= 300
+        assert row["train"] + row["validation"] + row["test"] == shard.samples
+        assert 0.3 < row["left"] / shard.samples < 0.7
+        assert name in (folder / "README.md").read_text()
+
+
+def test_splits_share_no_map(folder):
+    shard = load(folder, ["B-II"])["B-II"]
+    splits = split_of(shard.map)
+    seen = [set(shard.map[splits == k].tolist()) for k in range(3)]
+    assert all(seen) and not (seen[0] & seen[1] or seen[0] & seen[2] or seen[1] & seen[2])
+
+
+def test_a_shard_holds_its_samples(folder):
+    shard = load(folder, ["B-II"])["B-II"]
+    seed = int(shard.map[0])
+    samples = list(samples_of("B", "II", "placed", seed, Counts()))
+    rows = np.flatnonzero(shard.map == seed)
+    assert len(rows) == len(samples)
+    for row, sample in zip(rows, samples, strict=True):
+        nodes = slice(shard.first[row], shard.first[row + 1])
+        assert np.array_equal(shard.codes[shard.node_scan[nodes]], [n.codes for n in sample.nodes])
+        assert shard.node_x[nodes].tolist() == pytest.approx([n.x for n in sample.nodes], rel=1e-6)
+        assert shard.node_x[nodes][0] == 0.0 and shard.side[row] == sample.label.side
+        assert np.hypot(shard.node_x[nodes], shard.node_y[nodes]).max() <= 5.0 + 1e-3
+
+
+def test_data_does_not_depend_on_the_number_of_workers_and_grows_by_shards(folder, tmp_path):
+    again = generate(tmp_path / "again", ["B-II"], 300, workers=1)
+    before = json.loads((folder / MANIFEST).read_text())["sets"]["B-II"]["shards"]
+    assert again["sets"]["B-II"]["shards"] == before
+    more = generate(tmp_path / "again", ["B-II"], before[0]["samples"] + 1, workers=1)
+    assert more["sets"]["B-II"]["shards"][:1] == before[:1] and len(more["sets"]["B-II"]["shards"]) >= 2
+
+
+def test_bytes_read_and_selected(folder, tmp_path):
+    shard = load(folder, ["A-I-driven"])["A-I-driven"]
+    path = tmp_path / "shard.npz"
+    path.write_bytes(to_bytes(shard))
+    again = read_shard(path)
+    assert all(np.array_equal(a, b) for a, b in zip(shard, again, strict=True))
+    assert to_bytes(again) == path.read_bytes()
+    chosen = np.arange(shard.samples) % 3 == 0
+    part = select(shard, chosen)
+    both = concatenate([part, select(shard, ~chosen)])
+    assert both.samples == shard.samples and part.samples == chosen.sum()
+    k, original = 5, int(np.flatnonzero(chosen)[5])
+    a, b = slice(part.first[k], part.first[k + 1]), slice(shard.first[original], shard.first[original + 1])
+    assert np.array_equal(both.codes[both.node_scan[a]], shard.codes[shard.node_scan[b]])
+
+
+@pytest.mark.parametrize("harm", ["cut", "bit", "gone", "schema", "index", "pickle"])
+def test_a_bad_shard_is_named(folder, tmp_path, harm):
+    shard = load(folder, ["B-II"])["B-II"]
+    manifest = json.loads((folder / MANIFEST).read_text())
+    entry = manifest["sets"]["B-II"]["shards"][0]
+    path, sha = tmp_path / "shard.npz", entry["sha256"]
+    data = (folder / entry["file"]).read_bytes()
+    if harm == "cut":
+        data = data[:-100]
+    elif harm == "bit":
+        data = data[:500] + bytes([data[500] ^ 1]) + data[501:]
+    elif harm == "schema":
+        sha, data = None, to_bytes(shard._replace(side=shard.side.astype(np.int64)))
+    elif harm == "index":
+        sha, data = None, to_bytes(shard._replace(node_scan=shard.node_scan + 10**6))
+    elif harm == "pickle":
+        sha = None
+        np.savez(path, **{name: np.array([print], dtype=object) for name in SCHEMA})
+        data = path.read_bytes()
+    if harm != "gone":
+        path.write_bytes(data)
+    with pytest.raises(InputFileError, match=r"shard\.npz"):
+        read_shard(path, sha)
+
+
+def test_foreign_folders_and_manifests_are_refused(tmp_path):
+    with pytest.raises(InputFileError, match="is missing"):
+        load(tmp_path / "nowhere")
+    (tmp_path / "notes.txt").write_text("mine")
+    with pytest.raises(ConfigError, match="not empty"):
+        generate(tmp_path, ["A-I"], 10, workers=1)
+    (tmp_path / MANIFEST).write_text("[1, 2")
+    with pytest.raises(InputFileError, match="cannot be read"):
+        load(tmp_path)
+    (tmp_path / MANIFEST).write_text('{"format": "swarmscope-giwt-data", "version": 99}')
+    with pytest.raises(InputFileError, match="version 99"):
+        load(tmp_path)
+    with pytest.raises(ConfigError, match="none of"):
+        parse_set("D-I")
+
+
+def test_a_missing_set_is_named(folder):
+    with pytest.raises(InputFileError, match="no set 'C-I'"):
+        load(folder, ["C-I"])
+
+
+def test_driven_samples_are_the_key_points_of_the_runs():
+    _, about = make_shard(parse_set("C-II-driven"), 0)
+    counts = about["counts"]
+    assert counts["looked_at"] == sum(counts[k] for k in ("unreachable", "nothing_ahead", "tie", "labelled"))
+    assert counts["labelled"] == about["samples"] > 300
