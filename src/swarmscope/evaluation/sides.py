@@ -13,7 +13,7 @@ from swarmscope.sim.advice import Advice
 from swarmscope.sim.world import compile_world
 from swarmscope.tasks import Setup
 from swarmscope.tasks._occupancy import domain_of, free_cells_near, rasterise
-from swarmscope.tasks._search import SQRT2, sift_down, sift_up
+from swarmscope.tasks._search import SQRT2
 
 MOST_FIELDS = 200
 """More robots than this would take gigabytes."""
@@ -38,45 +38,65 @@ def make_advice(
 
 
 @jit
-def cost_to_go(blocked: NDArray[np.uint8], goal_row: int, goal_column: int) -> NDArray[np.float32]:
+def cost_to_go(
+    blocked: NDArray[np.uint8], goal_row: int, goal_column: int, until_row: int = -1, until_column: int = -1
+) -> NDArray[np.float32]:
     """Return the length of the shortest 8-connected way to the goal from every cell (H, W), in cells.
 
-    inf where blocked or cut off. Diagonal steps need both cells beside them free, as in the reference search.
+    inf where blocked or cut off. Diagonal steps need both cells beside them free, as in the reference search. With
+    an ``until`` cell the search ends when that one's cost is known; costs above it are not final then.
+
+    Cells wait in buckets by whole numbers of cells. No step is shorter than a bucket is wide, so what a bucket holds
+    is final when its turn comes, in whatever order (Denardo and Fox 1979).
     """
     height, width = blocked.shape
-    cost = np.full((height, width), math.inf, dtype=np.float32)
-    if blocked[goal_row, goal_column] == 1:
-        return cost
-    key, cell = np.empty(4 * (height + width)), np.empty(4 * (height + width), dtype=np.int32)
-    cost[goal_row, goal_column] = 0.0
-    key[0], cell[0] = 0.0, goal_row * width + goal_column
-    count = 1
-    while count > 0:
-        reached, here = key[0], int(cell[0])
-        count -= 1
-        key[0], cell[0] = key[count], cell[count]
-        sift_down(key, cell, count)
-        row, column = here // width, here % width
-        if reached > cost[row, column]:
-            continue
-        for dr in range(-1, 2):
-            for dc in range(-1, 2):
-                r, c = row + dr, column + dc
-                if (dr == 0 and dc == 0) or r < 0 or c < 0 or r >= height or c >= width or blocked[r, c] == 1:
+    wide = width + 2  # a blocked rim, so that no step needs to ask whether it leaves the grid
+    free = np.zeros((height + 2) * wide, dtype=np.bool_)
+    for row in range(height):
+        for column in range(width):
+            free[(row + 1) * wide + column + 1] = blocked[row, column] == 0
+    cost = np.full((height + 2) * wide, math.inf, dtype=np.float32)
+    goal = (goal_row + 1) * wide + goal_column + 1
+    until = (until_row + 1) * wide + until_column + 1
+    if not free[goal]:
+        return cost.reshape((height + 2, wide))[1:-1, 1:-1].copy()
+    waiting, counts = np.empty((3, 64 * (height + width)), dtype=np.int32), np.zeros(3, dtype=np.int64)
+    cost[goal] = 0.0
+    waiting[0, 0], counts[0] = goal, 1
+    level = 0
+    while counts.sum() > 0:
+        if until_row >= 0 and cost[until] < level:
+            break
+        bucket = level % 3
+        for k in range(counts[bucket]):
+            here = waiting[bucket, k]
+            reached = cost[here]
+            if reached < level:
+                continue  # was reached by a shorter way since
+            if max(counts) + 8 > waiting.shape[1]:
+                longer = np.empty((3, 2 * waiting.shape[1]), dtype=np.int32)
+                longer[:, : waiting.shape[1]] = waiting
+                waiting = longer
+            straight, aslant = np.float32(reached + 1.0), np.float32(reached + SQRT2)
+            into, into_aslant = int(straight) % 3, int(aslant) % 3
+            for across in (-1, 1):
+                if free[here + across] and straight < cost[here + across]:
+                    cost[here + across] = straight
+                    waiting[into, counts[into]] = here + across
+                    counts[into] += 1
+            for up in (-wide, wide):
+                if not free[here + up]:
                     continue
-                step = 1.0
-                if dr != 0 and dc != 0:
-                    if blocked[row, c] == 1 or blocked[r, column] == 1:
-                        continue
-                    step = SQRT2
-                through = np.float32(cost[row, column] + step)
-                if through < cost[r, c]:
-                    cost[r, c] = through
-                    if count == key.shape[0]:
-                        longer_key, longer_cell = np.empty(2 * count), np.empty(2 * count, dtype=np.int32)
-                        longer_key[:count], longer_cell[:count] = key, cell
-                        key, cell = longer_key, longer_cell
-                    key[count], cell[count] = through, r * width + c
-                    sift_up(key, cell, count)
-                    count += 1
-    return cost
+                if straight < cost[here + up]:
+                    cost[here + up] = straight
+                    waiting[into, counts[into]] = here + up
+                    counts[into] += 1
+                for across in (-1, 1):
+                    there = here + up + across
+                    if free[there] and free[here + across] and aslant < cost[there]:
+                        cost[there] = aslant
+                        waiting[into_aslant, counts[into_aslant]] = there
+                        counts[into_aslant] += 1
+        counts[bucket] = 0
+        level += 1
+    return cost.reshape((height + 2, wide))[1:-1, 1:-1].copy()

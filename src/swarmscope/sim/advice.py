@@ -60,10 +60,10 @@ def side_of_way(
     if apart < 1.0:
         return 0
     ux, uy = dx / apart, dy / apart
-    begin, end = _blocked_stretch(cost, x, y, ux, uy, apart)
+    begin, end = blocked_stretch(cost, x, y, ux, uy, apart)
     if begin < 0.0 or begin > horizon:
         return 0
-    row, column = _start_cell(cost, int(y), int(x))
+    row, column = start_cell(cost, int(y), int(x))
     if row < 0:
         return 0
     middle = 0.5 * (begin + end)
@@ -91,8 +91,8 @@ def _is_free(cost: np.ndarray, row: int, column: int) -> bool:
     return inside and bool(cost[row, column] < np.inf)
 
 
-@jit_inner
-def _blocked_stretch(
+@jit
+def blocked_stretch(
     cost: np.ndarray, x: float, y: float, ux: float, uy: float, apart: float
 ) -> tuple[float, float]:
     """Return where on the line the first blocked stretch begins and ends, (-1, -1) when the line is free."""
@@ -110,8 +110,8 @@ def _blocked_stretch(
     return begin, apart if begin >= 0.0 else -1.0
 
 
-@jit_inner
-def _start_cell(cost: np.ndarray, row: int, column: int) -> tuple[int, int]:
+@jit
+def start_cell(cost: np.ndarray, row: int, column: int) -> tuple[int, int]:
     """Return the cell, or the cheapest one within SNAP_CELLS of a blocked cell; (-1, -1) when there is none."""
     if _is_free(cost, row, column):
         return row, column

@@ -1,0 +1,96 @@
+"""The maps of GIWT 5.1.1: a walled square with rectangles (A), cylinders (B), or both (C), at random and overlapping.
+
+As printed: 20 x 20 m, 10 to 30 obstacles, rectangles with sides of 0.5 to 3 m at any angle, cylinders with radii of
+0.5 to 3 m. Centres are uniform over the square (not printed). An obstacle that would come too near a place that has to
+stay free is drawn anew.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swarmscope.errors import UnsolvableWorldError
+from swarmscope.sim.world import Circle, Obstacle, Polygon, WorldSpec
+from swarmscope.tasks._rooms import WALL_M, closed_room
+
+SIZE_M = 20.0
+FEWEST, MOST = 10, 30
+SIDE_M = (0.5, 3.0)
+RADIUS_M = (0.5, 3.0)
+REDRAWS = 200
+"""Of one obstacle; after so many it is left out."""
+
+Floats = NDArray[np.float64]
+Kind = Literal["A", "B", "C"]
+
+
+@dataclass(frozen=True)
+class MapOptions:
+    """Sizes; the defaults are those of the document."""
+
+    obstacles: Kind = "C"  # A rectangles, B cylinders, C both
+    size_m: float = SIZE_M
+    fewest: float = FEWEST
+    most: float = MOST
+    apart_m: float = 7.0  # from a start to its goal, at least (task I)
+
+
+def draw_map(rng: np.random.Generator, options: MapOptions, keep_free: Floats, free_m: float) -> WorldSpec:
+    """Return a walled map whose obstacles stay ``free_m`` [m] off the points ``keep_free (K, 2)`` [m]."""
+    obstacles: list[Obstacle] = []
+    for _ in range(int(rng.integers(int(options.fewest), int(options.most) + 1))):
+        for _ in range(REDRAWS):
+            one = _draw_obstacle(rng, options)
+            if _stays_off(one, keep_free, free_m):
+                obstacles.append(one)
+                break
+    return walled(obstacles, options.size_m)
+
+
+def walled(obstacles: Sequence[Obstacle], size: float) -> WorldSpec:
+    """Return the world of a square with walls round it."""
+    bounds = (-WALL_M, -WALL_M, size + WALL_M, size + WALL_M)
+    # made of numbers that are known to be valid: a million maps need not be looked at twice
+    return WorldSpec.model_construct(obstacles=[*closed_room(0.0, 0.0, size, size), *obstacles], bounds=bounds)
+
+
+def _draw_obstacle(rng: np.random.Generator, options: MapOptions) -> Obstacle:
+    kind = options.obstacles
+    if kind == "C":
+        kind = "A" if rng.random() < 0.5 else "B"
+    x, y = (float(v) for v in rng.uniform(0.0, options.size_m, 2))
+    if kind == "B":
+        return Circle.model_construct(type="circle", center=(x, y), radius=float(rng.uniform(*RADIUS_M)))
+    a, b = 0.5 * rng.uniform(*SIDE_M, 2)
+    yaw = rng.uniform(0.0, math.pi)
+    c, s = math.cos(yaw), math.sin(yaw)
+    corners = [(x + c * u - s * v, y + s * u + c * v) for u, v in ((a, b), (-a, b), (-a, -b), (a, -b))]
+    return Polygon.model_construct(type="polygon", points=[(float(px), float(py)) for px, py in corners])
+
+
+def _stays_off(obstacle: Obstacle, points: Floats, distance: float) -> bool:
+    """Tell whether no point is in the obstacle or closer to it than ``distance``."""
+    if not len(points):
+        return True
+    if isinstance(obstacle, Circle):
+        away = np.hypot(points[:, 0] - obstacle.center[0], points[:, 1] - obstacle.center[1]) - obstacle.radius
+        return bool(away.min() > distance)
+    assert isinstance(obstacle, Polygon)  # noqa: S101 - the only other kind drawn
+    corners = np.array(obstacle.points)
+    edges = np.roll(corners, -1, axis=0) - corners
+    rel = points[:, None, :] - corners[None, :, :]
+    along = np.clip((rel * edges).sum(axis=2) / (edges**2).sum(axis=1), 0.0, 1.0)
+    off = rel - along[:, :, None] * edges
+    inside = (edges[:, 0] * rel[:, :, 1] - edges[:, 1] * rel[:, :, 0] > 0.0).all(axis=1)
+    return bool(not inside.any() and np.hypot(off[:, :, 0], off[:, :, 1]).min() > distance)
+
+
+def unsolvable(name: str, seed: int, draws: int, why: str) -> UnsolvableWorldError:
+    """Return the error for a seed that gives no solvable map."""
+    return UnsolvableWorldError(f"{name}: no solvable map in {draws} draws of seed {seed} ({why})")
