@@ -237,8 +237,8 @@ def test_an_answer_that_comes_too_late_is_dropped(model):
 
 
 def test_answers_for_another_direction_are_not_used(model):
-    for turned, heard in ((4.0, 1), (6.0, 0)):
-        robots = Robots(planner_of(model), turned_deg=5.0).step()
+    for turned, heard in ((1.5, 1), (2.5, 0)):
+        robots = Robots(planner_of(model), turned_deg=2.0).step()
         answer = robots.exchange()
         robots.percepts["goal_bearing"][0] += math.radians(turned)
         robots.hand(0, answer).step()
