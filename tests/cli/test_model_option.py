@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import sys
 
 from command_line import SMALL, refused, swarmscope
@@ -11,9 +13,12 @@ from giwt_models import make_model
 
 def test_a_run_with_a_model_of_ones_own(tmp_path):
     model = make_model(tmp_path / "m")
-    result = swarmscope("run", *SMALL[:-1], "--planner", "giwt", "--set", f"planner.model={model}", "--out", tmp_path / "r")
+    chosen = ("--planner", "giwt", "--set", f"planner.model={model}")
+    result = swarmscope("run", *SMALL[:-1], *chosen, "--out", tmp_path / "r")
     assert result.exit_code == 0, result.output
     assert (tmp_path / "r/replay.html").is_file()
+    metrics = json.loads((tmp_path / "r/metrics.json").read_text())
+    assert metrics["model_sha256"] == hashlib.sha256((model / "model.json").read_bytes()).hexdigest()
     assert str(model) in (tmp_path / "r/config.yaml").read_text()
 
 

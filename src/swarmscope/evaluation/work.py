@@ -17,7 +17,7 @@ import numpy as np
 
 from swarmscope.errors import SwarmscopeError
 from swarmscope.evaluation.cases import find_cases
-from swarmscope.evaluation.provenance import PACKAGE, git_revision, versions
+from swarmscope.evaluation.provenance import PACKAGE, git_revision, installed_version, versions
 from swarmscope.evaluation.runner import Outcome, References, figures, play
 from swarmscope.evaluation.scenario import PlannerModel, Scenario, parse_scenario, planner_of
 
@@ -66,10 +66,10 @@ def revision() -> str:
 
 
 def model_state(config: dict[str, Any]) -> str | None:
-    """Return a hash of the network that the scenario's planner runs, None without one."""
+    """Return which network the scenario's planner runs, and by which version of what; None without one."""
     planner = planner_of(PlannerModel.model_validate(config.get("planner", {})))
     state = getattr(planner, "model_state", None)
-    return None if state is None else str(state())
+    return None if state is None else f"{state()} onnxruntime {installed_version('onnxruntime')}"
 
 
 def unit_key(config: dict[str, Any]) -> str:
