@@ -64,7 +64,7 @@ def main() -> None:
     """Print the figures."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--model", type=Path, default=None)
-    asked = parser.parse_args()
+    asked = parser.parse_known_args()[0]
     planner = giwt.PLANNER if asked.model is None else giwt.with_model(asked.model)
     try:
         network = planner.network

@@ -247,15 +247,26 @@ def test_answers_for_another_direction_are_not_used(model):
 
 def test_it_asks_on_the_way_before_it_has_to_stand(model):
     robots = Robots(planner_of(model))
-    back = (-0.5 * math.cos(GOAL), -0.5 * math.sin(GOAL), A[2])
-    robots.ranges[0] = scan_at(circles_world(WORLD), robots.rig, *back)
+    sensor = robots.rig.sensor
+    bearing = sensor.angle_min + sensor.increment * np.arange(sensor.beams) - robots.percepts["goal_bearing"][0]
+    bay = np.abs((bearing + math.pi) % (2.0 * math.pi) - math.pi) < math.radians(70.0)
+    robots.ranges[0] = np.where(bay, 1.0, np.inf)
+    assert robots.step().sent(0) == []  # 0.5 s from where a side has to be chosen is 0.85 m from the bay's end
+    robots.ranges[0] = np.where(bay, 0.8, np.inf)
     robots.step()
     assert robots.decisions["v"][0] > 0.0
     assert [header[0] for _, header, _ in robots.sent(0)] == [KIND_DIRECTED_REQUEST]
     answer = robots.exchange()
-    robots.ranges[0] = scan_at(circles_world(WORLD), robots.rig, *A)
+    robots.ranges[0] = np.where(bay, 0.5, np.inf)
     robots.hand(0, answer).step()
     assert (robots.decisions["fused"][0], robots.decisions["heard"][0]) == (1, 1)
+
+
+def test_a_single_tree_ahead_is_no_reason_to_ask(model):
+    robots = Robots(planner_of(model))
+    tree = (0.95 * math.cos(GOAL), 0.95 * math.sin(GOAL), 0.15)
+    robots.ranges[0] = scan_at(circles_world([tree]), robots.rig, *A)
+    assert robots.step().sent(0) == []
 
 
 def test_a_robot_at_its_goal_answers(model):

@@ -35,6 +35,7 @@ from swarmscope.onboard.perception.safety import safe_directions
 from swarmscope.onboard.planning import dh_bug
 from swarmscope.onboard.planning._asking import obstacle_ahead
 from swarmscope.onboard.planning._contract import DECIDE, R_ALONE, R_ANSWERS, R_FUSED
+from swarmscope.onboard.planning._following import turn_to_safe
 from swarmscope.onboard.planning._giwt_graph import (
     FEATURES,
     GRID_M,
@@ -85,8 +86,8 @@ class Params(NamedTuple):
     """Longest wait; after it nobody is waited for during the same time."""
     ask: int = 1
     """0: nobody is asked, every side is chosen from the own scan."""
-    ask_ahead_s: float = 1.0
-    """Neighbours are asked for this long before an obstacle comes within l_th."""
+    ask_ahead_s: float = 0.5
+    """Neighbours are asked this long before an obstacle comes within l_th, where a key point may follow."""
     ask_every_s: float = 1.0
     """Shortest time between two rounds of requests on the way."""
     answer_s: float = 0.6
@@ -394,6 +395,31 @@ def _ask_round(percept: Row, shared: Row, memory: Row, decision: Row) -> bool:
     return n > 0
 
 
+@jit
+def key_point_near(
+    work: np.ndarray,
+    percept: Row,
+    nearer: np.ndarray,
+    edges: np.ndarray,
+    safe: np.ndarray,
+    rig: Rig,
+    params: Params,
+) -> bool:
+    """Tell whether there may be a key point ``ask_ahead_s`` from here: there is one if everything comes nearer.
+
+    ``work (M,)`` is the scan without moving neighbours; ``nearer``, ``edges``, ``safe`` are scratch.
+    """
+    sensor = rig.sensor
+    way = params.ask_ahead_s * rig.body.v_max
+    for n in range(sensor.beams):
+        nearer[n] = max(sensor.range_min, work[n] - way) if work[n] >= sensor.range_min else work[n]
+    safe_directions(
+        nearer, sensor.range_min, sensor.range_max, sensor.wraps, rig.reach[PRINTED_RULE], edges, safe
+    )
+    turn = min(turn_to_safe(percept, safe, 1, rig), turn_to_safe(percept, safe, -1, rig))
+    return bool(turn > math.radians(params.key_deg))
+
+
 @jit_inner
 def _may_choose(percept: Row, shared: Row, memory: Row, decision: Row, rig: Rig, params: Params) -> bool:
     """At a key point: tell whether all has been heard that will be, else ask and wait."""
@@ -452,6 +478,9 @@ def prepare(
             and memory["edge"] == 0
             and percept["now_s"] - shared["asked_s"] >= params.ask_every_s
             and obstacle_ahead(work, percept, rig, horizon)
+            and key_point_near(
+                work, percept, scratch.filtered[row], edges, scratch.narrow[row], rig, params
+            )
         ):
             _ask_round(percept, shared, memory, decision)
     elif memory["mode"] != KEY_POINT:
