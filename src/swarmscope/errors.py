@@ -4,10 +4,19 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
+from typing import Any
 
 
 class SwarmscopeError(Exception):
     """Root of all errors that a user can cause or meet; the command line prints it without a traceback."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Travel between processes as message and fields: exceptions are else made anew by ``__init__``."""
+        return _made_anew, (type(self), self.args), self.__dict__
+
+
+def _made_anew(kind: type[SwarmscopeError], args: tuple[object, ...]) -> SwarmscopeError:
+    return kind.__new__(kind, *args)
 
 
 class UnknownNameError(SwarmscopeError):

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import shlex
 
 import pytest
 from command_line import refused, swarmscope
@@ -49,7 +50,7 @@ def test_random_maps(tmp_path):
 def test_a_field(tmp_path):
     words = ("--map", "one-disc", "--alone", "--resolution", 21, "--out", tmp_path / "f.png")
     result = swarmscope("disk", "field", "navigation-function", *words)
-    assert "0 stall points" in result.stdout
+    assert "; 0 stall points" in result.stdout
     assert (tmp_path / "f.png").read_bytes().startswith(b"\x89PNG")
 
 
@@ -88,6 +89,9 @@ def test_the_list_says_what_each_knows_and_guarantees():
         (("run", "--robots", "50", "--radius", "0.1"), "overlap at their starts"),
         (("run", "none.py"), "No such file"),
         (("table", "report", "report"), "name each once"),
+        (("table", "report", "--map", "c0", "--map", "c0"), "two maps have this name"),
+        (("run", "reactive:gain=2"), "reactive.gain: 2 is not between"),
+        (("start", "mine.txt"), "ends in .py"),
         (("table", "report:obstacle_buffer"), "not KEY=VALUE"),
         (("random", "--seeds", "nothing"), "nothing"),
         (("field", "report", "--robot", "5"), "no robot 5"),
@@ -100,12 +104,30 @@ def test_what_cannot_be_done_is_told(words, why, tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_an_impossible_map_is_refused(tmp_path):
+@pytest.mark.parametrize(("height", "why"), [(0.35, "infeasible: robot 1 of"), (0.0, "robot 0 would touch obstacle")])
+def test_an_impossible_map_is_refused(height, why, tmp_path):
     place = tmp_path / "wall.yaml"
-    wall = "\n".join(f"  - {{center: [{x / 10 - 1}, 0.35], radius: 0.06}}" for x in range(21))
+    wall = "\n".join(f"  - {{center: [{x / 10 - 1}, {height}], radius: 0.06}}" for x in range(21))
     place.write_text(f"obstacles:\n{wall}\n")
-    told = refused("disk", "run", "--map", place, "--out", tmp_path / "out")
-    assert "infeasible: robot" in told or "would touch obstacle" in told
+    assert why in refused("disk", "run", "--map", place, "--out", tmp_path / "out")
+
+
+def test_the_command_that_is_kept_makes_the_same_run_again(tmp_path):
+    words = ("disk", "run", "report", "--map", "random:20007", "--radius", "0.04", "--out", tmp_path / "my run")
+    assert swarmscope(*words).exit_code == 0
+    kept = shlex.split(json.loads((tmp_path / "my run" / "result.json").read_text())["command"])
+    assert "--radius" in kept
+    assert swarmscope(*kept[1:], "--out", tmp_path / "again").exit_code == 0
+    first, again = (tmp_path / name / "runs.csv" for name in ("my run", "again"))
+    assert first.read_bytes() == again.read_bytes()
+
+
+@pytest.mark.parametrize("words", [("run", "mine.py"), ("field", "mine.py")])
+def test_a_place_that_cannot_be_written_is_told_before_any_step(words, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "file").write_text("")
+    (tmp_path / "mine.py").write_text("def compute_gradients(state, targets, obstacles, r):\n    return 1 / 0\n")
+    assert "cannot write" in refused("disk", *words, "--out", tmp_path / "file" / "here")
 
 
 def test_a_controller_that_fails_is_told_where(tmp_path):

@@ -51,6 +51,17 @@ def test_the_rim_is_not_left():
     assert uy == pytest.approx(0.6)
 
 
+@pytest.mark.parametrize("aside", [0.0, 1e-5, 1e-4, 1e-3])
+def test_on_the_rim_with_a_robot_inwards_one_stays_in_the_disk_and_is_not_too_fast(aside):
+    # On the rim one has to go inwards a little; a robot there leaves only velocities far along the rim for that.
+    away = 2 * R + KEPT
+    state = [(1.0, 0.0), (1.0 - away * math.cos(aside), away * math.sin(aside))]
+    for wish in ((1.0, 0.0), (0.0, 1.0), (0.0, -1.0), (-1.0, 0.0)):
+        ux, uy = admissible(wish, state)
+        assert math.hypot(ux, uy) <= 1.0
+        assert math.hypot(1.0 + ux * STEP, uy * STEP) <= 1.0 + 1e-12
+
+
 def test_too_many_things_at_once_make_one_stand():
     disc = np.tile([[0.0, 0.25, 0.2]], (MOST + 5, 1))
     assert admissible((1.0, -1.0), [(0, -1e-5)], disc) == (0.0, 0.0)

@@ -9,20 +9,20 @@ from swarmscope.errors import ConfigError, InputFileError, UnknownNameError, Uns
 
 def test_the_five_maps_of_the_report():
     assert [len(one.obstacles) for one in maps.REPORT_MAPS.values()] == [3, 5, 2, 1, 5]
-    assert maps.find_map("crevice", 5).as_dicts()[1] == {"center": (0.5, -0.22), "radius": 0.2}
+    assert maps.find_map("crevice", rules.Rules()).as_dicts()[1] == {"center": (0.5, -0.22), "radius": 0.2}
 
 
 def test_unknown_names_are_told():
     with pytest.raises(UnknownNameError, match="did you mean 'crevice'"):
-        maps.find_map("crevise", 5)
+        maps.find_map("crevise", rules.Rules())
     with pytest.raises(ConfigError, match="whole number"):
-        maps.find_map("random:x", 5)
+        maps.find_map("random:x", rules.Rules())
 
 
 def test_a_map_is_read_from_a_file(tmp_path):
     file = tmp_path / "mine.yaml"
     file.write_text("obstacles:\n  - {center: [0.1, 0.2], radius: 0.05}\n")
-    assert maps.find_map(str(file), 5).obstacles.tolist() == [[0.1, 0.2, 0.05]]
+    assert maps.find_map(str(file), rules.Rules()).obstacles.tolist() == [[0.1, 0.2, 0.05]]
 
 
 @pytest.mark.parametrize(
@@ -33,9 +33,15 @@ def test_a_map_is_read_from_a_file(tmp_path):
         ("obstacles: [{center: [0], radius: 1}]", "two numbers"),
         ("obstacles: [{center: [0, .nan], radius: 1}]", "finite"),
         ("obstacles: [{center: [0, 0], radius: -1}]", "above 0"),
+        ("obstacles: [{center: [1.0e+200, 0], radius: 1}]", "the disk has radius 1"),
         ("obstacles: [{center: [0, 0]}]", "obstacles.0. has to hold"),
         ("obstacles: [", "is not YAML"),
         ("discs: []", "nothing else"),
+        ("obstacles: 2026-13-45", "is not YAML: month"),
+        (f"obstacles: {'9' * 5000}", "is not YAML"),
+        ("[" * 3000, "is not a map"),
+        ("obstacles: [{center: '12', radius: 0.1}]", "two numbers"),
+        (f"obstacles: [{{center: [0, 0], radius: {'9' * 400}}}]", "two numbers"),
     ],
 )
 def test_files_that_are_no_maps_are_refused(tmp_path, text, why):

@@ -12,7 +12,7 @@ NO_DISCS = np.empty((0, 3))
 
 
 def play(name, permutations, **numbers):
-    of = runs.problem(rules.Rules(n=len(permutations[0])), [maps.find_map(name, 5)], permutations)
+    of = runs.problem(rules.Rules(n=len(permutations[0])), [maps.find_map(name, rules.Rules())], permutations)
     kind = find("planned", numbers)
     return of, runs.play(of, kind.create(of, kind.params))
 

@@ -42,6 +42,9 @@ def test_lists_are_as_good_as_arrays(tmp_path):
         ("return state * np.nan", r"velocity of robot 0 is \[nan, nan\]"),
         ("return 1 / 0", "raised ZeroDivisionError in line 3: division by zero"),
         ("return state + 1j", "wanted numbers"),
+        ("raise SystemExit(0)", "raised SystemExit in line 3: 0"),
+        ("raise ValueError('one\\ntwo')", "raised ValueError in line 3: one two$"),
+        ("return type('Tensor', (), {'__array__': lambda *_, **__: 1 / 0})()", "returned a Tensor, which is no array"),
     ],
 )
 def test_wrong_answers_are_told_with_step_map_and_permutation(tmp_path, body, why):
@@ -59,11 +62,18 @@ def test_wrong_answers_are_told_with_step_map_and_permutation(tmp_path, body, wh
         ("def compute_gradients(:", "is not Python: line 1"),
         ("import nothing_of_that_name", "raised ModuleNotFoundError in line 1"),
         ("\0", "is not Python"),
+        ("raise SystemExit", "raised SystemExit in line 1"),
     ],
 )
 def test_files_that_cannot_be_used_are_told(tmp_path, body, why):
     with pytest.raises(InputFileError, match=why):
         play(write(tmp_path, body))
+
+
+def test_velocities_whose_squares_overflow_are_cut_like_others(tmp_path):
+    outcome = play(write(tmp_path, function("return (targets - state) * 1e200")))
+    assert outcome.status.tolist() == [runs.TIMED_OUT]
+    assert outcome.length[0] == pytest.approx([50 * 0.00025] * 2)
 
 
 def test_a_missing_file_is_told(tmp_path):
@@ -85,3 +95,6 @@ def test_the_starter_works_and_is_not_overwritten(tmp_path):
     assert np.isfinite(play(file).length).all()
     with pytest.raises(InputFileError, match="is there already"):
         user.write_starter(file)
+    with pytest.raises(InputFileError, match=r"ends in \.py"):
+        user.write_starter(tmp_path / "first.txt")
+    assert not (tmp_path / "first.txt").exists()

@@ -72,7 +72,7 @@ def test_choices_are_read():
         read_choice("reactiv")
     with pytest.raises(UnknownNameError, match="unknown parameter 'buffer'"):
         read_choice("report:buffer=1")
-    with pytest.raises(ConfigError, match="is not a float"):
+    with pytest.raises(ConfigError, match="is not a number"):
         read_choice("report:robot_buffer=wide")
     with pytest.raises(ConfigError, match="not KEY=VALUE"):
         read_choice("report:5")

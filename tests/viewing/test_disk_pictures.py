@@ -35,6 +35,18 @@ def test_paths_of_all_robots_are_drawn_and_the_bytes_are_the_same_again():
     assert not has(pixels, pictures.CRASH)
 
 
+def test_names_are_no_formulas():
+    of, outcome, film = played("reactive", max_steps=60)
+    odd = runs.problem(of.rules, [maps.DiskMap("$x_{$", of.maps[0].obstacles)], of.permutation)
+    name = "mine $\\frac$"
+    assert image(pictures.trajectories_png(odd, 0, outcome, film, name, 8000)).size
+    assert image(pictures.clearance_png(odd, 0, outcome, film, name)).size
+    assert image(pictures.paths_side_by_side_png(odd, 0, [(name, outcome, film)], 8000)).size
+    kind = controllers.find("report")._replace(name=name)
+    situation = Situation(kind, odd.maps[0], odd.rules, (0, 3, 1, 4, 2), 2, None)
+    assert image(pictures.field_png(situation, basins(situation, 5, coarse=20.0), 20.0)).size
+
+
 def test_a_collision_is_marked():
     of, outcome, film = played()
     outcome.status[0], outcome.involved[0] = runs.HIT_ROBOT, (1, 3)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import shlex
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -49,6 +50,12 @@ def run_command(
 
     choices = read_choices(names)
     of = one_problem(map_, permutation, robots, radius)
+    of_permutation = "".join(str(k) for k in of.permutation[0]) if of.rules.n <= 10 else "many"
+    place = out or Path("runs") / "disk" / f"{file_stem(of.maps[0].name)}-{of_permutation}"
+    about = f"One run on {of.maps[0].name} by {len(choices)} controllers."
+    options = ["--map", map_, "--permutation", ",".join(map(str, of.permutation[0])), "--robots", str(of.rules.n)]
+    options += [] if radius is None else ["--radius", repr(radius)]
+    results = Results(place, f"A run on {of.maps[0].name}", about, ["disk", "run", *names, *options])
     least = bound(of)
     all_played, films = [], []
     for choice in choices:
@@ -68,11 +75,6 @@ def run_command(
             contents["side-by-side.png"] = pictures.paths_side_by_side_png(of, 0, side, int(least[0]))
         shown = [replay.Shown(one.label, one.outcome, film) for one, film in zip(all_played, films, strict=True)]
         contents["replay.html"] = replay.replay_page(of, shown, int(least[0])).encode()
-    of_permutation = "".join(str(k) for k in of.permutation[0]) if of.rules.n <= 10 else "many"
-    place = out or Path("runs") / "disk" / f"{file_stem(of.maps[0].name)}-{of_permutation}"
-    about = f"One run on {of.maps[0].name} by {len(choices)} controllers."
-    options = [f"--map {map_}", f"--permutation {','.join(map(str, of.permutation[0]))}", f"--robots {of.rules.n}"]
-    results = Results(place, f"A run on {of.maps[0].name}", about, ["disk", "run", *names, *options])
     results.save([all_played], contents)
     results.print_names()
 
@@ -84,9 +86,13 @@ def table_command(
     choices = read_choices(names)
     rules = Rules()
     chosen = [read_permutation(text, rules.n) for text in permutations] or list(all_permutations(rules.n))
-    of = problem(rules, [maps.find_map(name, rules.n) for name in map_names or maps.REPORT_MAPS], chosen)
+    of = problem(rules, [maps.find_map(name, rules) for name in map_names or maps.REPORT_MAPS], chosen)
+    twice = first_twice([one.name for one in of.maps])
+    if twice is not None:
+        raise ConfigError(twice, "two maps have this name; name each once, and give files different names")
     check(of)
-    options = [f"--map {name}" for name in map_names] + [f"--permutation {text}" for text in permutations]
+    options = [word for name in map_names for word in ("--map", name)]
+    options += [word for text in permutations for word in ("--permutation", text)]
     about = (
         f"{len(of.maps)} maps, {len(chosen)} permutations of the goals of {rules.n} robots: every controller played "
         "the same runs under the same rules."
@@ -106,7 +112,8 @@ def random_command(
     """Play random maps with each controller: how many arrive, how far from the bound, and that nobody collides."""
     choices = read_choices(names)
     chosen = seed_set(seeds)[:count]
-    options = [*(f"--robots {n}" for n in robots), f"--seeds {seeds}", f"--maps {len(chosen)}"]
+    options = [word for n in robots for word in ("--robots", str(n))]
+    options += ["--seeds", seeds, "--maps", str(len(chosen))]
     about = (
         f"{len(chosen)} random maps, each with a random permutation: loose discs, U-shaped traps, passages just "
         "wider and just narrower than a robot. Every controller played the same runs."
@@ -143,13 +150,16 @@ def field_command(
         raise ConfigError("robot", f"there is no robot {robot}; they are 0 to {of.rules.n - 1}")
     others = None if alone else of.start[0]
     situation = Situation(choice.kind(), of.maps[0], of.rules, tuple(of.permutation[0].tolist()), robot, others)
+    place = out or Path("runs") / "disk" / f"field-{file_stem(choice.label)}-{file_stem(of.maps[0].name)}-{robot}.png"
+    if place.is_dir():
+        raise ConfigError(str(place), "is a folder; name the PNG file to write")
+    put_in_place(place.parent, {})  # a folder that cannot be written is told before the work
     with waiting(f"field of {choice.label} on {of.maps[0].name}"):
         # A user's Python is called for every point and step: fewer of both.
         points, coarse = (USER_POINTS, USER_COARSE) if choice.file else (FIELD_POINTS, 1.0)
         found = basins(situation, resolution or points, coarse)
         print(describe(found))
         picture = pictures.field_png(situation, found, coarse)
-    place = out or Path("runs") / "disk" / f"field-{file_stem(choice.label)}-{file_stem(of.maps[0].name)}-{robot}.png"
     put_in_place(place.parent, {place.name: picture})
     print(place)
 
@@ -186,12 +196,11 @@ def one_problem(map_: str, permutation: str | None, robots: int | None, radius: 
     """Return the problem of one run. Errors: those of maps, rules and permutations, and of runs that cannot end."""
     n = robots or Rules().n
     rules = scaled(n) if radius is None else scaled(n, r=radius)
-    if map_.startswith("random:") and permutation is None:
-        case = random_map(maps.seed_of(map_), rules)
-        place, chosen = case.map, case.permutation
-    else:
-        place = maps.find_map(map_, n)
-        chosen = tuple(range(n)) if permutation is None else read_permutation(permutation, n)
+    place, chosen = maps.find_map(map_, rules), tuple(range(n))
+    if permutation is not None:
+        chosen = read_permutation(permutation, n)
+    elif map_.startswith("random:"):
+        chosen = random_map(maps.seed_of(map_), rules).permutation
     of = problem(rules, [place], [chosen])
     check(of)
     return of
@@ -200,11 +209,15 @@ def one_problem(map_: str, permutation: str | None, robots: int | None, radius: 
 def read_choices(names: Sequence[str]) -> list[Choice]:
     """Return the controllers of a command line, which have to differ in name. Errors: those of ``read_choice``."""
     choices = [read_choice(name) for name in names]
-    labels = [choice.label for choice in choices]
-    twice = next((label for label in labels if labels.count(label) > 1), None)
+    twice = first_twice([choice.label for choice in choices])
     if twice is not None:
         raise ConfigError(twice, "two controllers have this name; name each once, and give files different names")
     return choices
+
+
+def first_twice(names: Sequence[str]) -> str | None:
+    """Return the first name that is there more than once."""
+    return next((name for name in names if names.count(name) > 1), None)
 
 
 def as_problem(rules: Rules, cases: Sequence[RandomCase]) -> Problem:
@@ -275,7 +288,7 @@ class Results:
 
     def __init__(self, out: Path, title: str, about: str, words: Sequence[str]) -> None:
         self.out, self.title, self.about = out, title, about
-        self.command = " ".join(["swarmscope", *words])
+        self.command = shlex.join(["swarmscope", *words])
         self.names: list[str] = []
         put_in_place(out, {})  # a folder that cannot be written is told before hours of work
 

@@ -27,6 +27,13 @@ app.add_typer(experiments, name="experiment")
 disk = typer.Typer(no_args_is_help=True, help="Discs crossing a unit disk: compare controllers, try your own, look.")
 app.add_typer(disk, name="disk")
 
+giwt = typer.Typer(no_args_is_help=True, help="The network that picks a side: expert data, training, scores, export.")
+app.add_typer(giwt, name="giwt")
+
+GiwtData = Annotated[Path, typer.Option("--data", help="Folder of the expert data.")]
+GiwtSets = Annotated[
+    list[str] | None, typer.Option("--set-of", help="A-I ... C-II, A-I-driven ..., placed, driven, all; repeatable.")
+]
 Controllers = Annotated[
     list[str] | None,
     typer.Argument(
@@ -325,6 +332,77 @@ def disk_list() -> None:
     from swarmscope.cli.disk import list_command
 
     list_command()
+
+
+@giwt.command(
+    "data",
+    epilog="Examples:\n\n"
+    "[bold]swarmscope giwt data --samples 100000[/bold]\n\n"
+    "[bold]swarmscope giwt data --set-of driven --samples 50000[/bold]\n\n"
+    "[bold]swarmscope giwt data --check[/bold]",
+)
+def giwt_data(
+    data: GiwtData = Path("runs/giwt/data"),
+    set_of: GiwtSets = None,
+    samples: Annotated[int, typer.Option(min=1, help="Of each set, at least.")] = 100_000,
+    workers: Workers = None,
+    check: Annotated[bool, typer.Option("--check", help="Only check every shard's checksum.")] = False,
+) -> None:
+    """Generate expert data, as far as it is not there yet. May be stopped at any moment."""
+    from swarmscope.cli.giwt import data_command
+
+    data_command(data, set_of or ["placed"], samples, workers, check)
+
+
+@giwt.command(
+    "train",
+    epilog="Examples:\n\n"
+    "[bold]swarmscope giwt train[/bold]\n\n"
+    "[bold]swarmscope giwt train full --set network=gat --init runs/giwt/cnn/best.safetensors[/bold]\n\n"
+    "[bold]swarmscope giwt train mine.yaml --out runs/giwt/mine[/bold]",
+)
+def giwt_train(
+    config: Annotated[str, typer.Argument(help="tiny, cpu, full, or a YAML file.")] = "cpu",
+    data: GiwtData = Path("runs/giwt/data"),
+    out: Annotated[Path | None, typer.Option(help="Folder, else runs/giwt/<network>.")] = None,
+    init: Annotated[Path | None, typer.Option(help="Checkpoint whose encoder is taken over.")] = None,
+    set_: Annotated[
+        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="A key of the configuration; repeatable.")
+    ] = None,
+) -> None:
+    """Train a network. When stopped, the same command goes on after the last whole epoch."""
+    from swarmscope.cli.giwt import train_command
+
+    train_command(config, data, out, init, set_ or [])
+
+
+@giwt.command(
+    "eval",
+    epilog="Example: [bold]swarmscope giwt eval runs/giwt/giwt runs/giwt/gat runs/giwt/cnn --out scores.json[/bold]",
+)
+def giwt_eval(
+    runs: Annotated[list[Path], typer.Argument(help="Run folders or checkpoints; the first is compared with the others.")],
+    data: GiwtData = Path("runs/giwt/data"),
+    set_of: GiwtSets = None,
+    split: Annotated[str, typer.Option(help="train, validation or test.")] = "test",
+    out: Annotated[Path | None, typer.Option(help="JSON file for all figures.")] = None,
+) -> None:
+    """Score trained networks on maps that no training saw."""
+    from swarmscope.cli.giwt import eval_command
+
+    eval_command(runs, data, set_of or ["placed"], split, out)
+
+
+@giwt.command("export", epilog="Example: [bold]swarmscope giwt export runs/giwt/giwt runs/giwt/model[/bold]")
+def giwt_export(
+    run: Annotated[Path, typer.Argument(help="Run folder or checkpoint.")],
+    out: Annotated[Path, typer.Argument(help="Folder of the model.")],
+    scores: Annotated[Path | None, typer.Option(help="JSON file of 'eval', kept in the model's card.")] = None,
+) -> None:
+    """Write the ONNX files that a robot runs, checked against PyTorch."""
+    from swarmscope.cli.giwt import export_command
+
+    export_command(run, out, scores)
 
 
 def main() -> None:

@@ -10,10 +10,12 @@ from typing import Any
 import numpy as np
 import yaml
 
-from swarmscope.disk.rules import Floats
+from swarmscope.disk.rules import Floats, Rules
 from swarmscope.errors import ConfigError, InputFileError, UnknownNameError
 
 MOST_OBSTACLES = 200
+FARTHEST = 100.0
+"""Largest coordinate and radius in a file."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,8 +67,8 @@ EMPTY = _map("empty", "no obstacle")
 NAMED = REPORT_MAPS | {EMPTY.name: EMPTY}
 
 
-def find_map(name: str, n: int) -> DiskMap:
-    """Return the map of that name, 'random:SEED' for n robots, or the one in that YAML file.
+def find_map(name: str, rules: Rules) -> DiskMap:
+    """Return the map of that name, 'random:SEED' for robots of these rules, or the one in that YAML file.
 
     Errors: UnknownNameError, InputFileError, ConfigError.
     """
@@ -74,9 +76,8 @@ def find_map(name: str, n: int) -> DiskMap:
         return NAMED[name]
     if name.startswith("random:"):
         from swarmscope.disk.random_maps import random_map
-        from swarmscope.disk.rules import scaled
 
-        return random_map(seed_of(name), scaled(n)).map
+        return random_map(seed_of(name), rules).map
     if Path(name).suffix in {".yaml", ".yml", ".json"}:
         return read_map(Path(name))
     raise UnknownNameError("map", name, [*NAMED, "random:SEED", "FILE.yaml"])
@@ -96,8 +97,10 @@ def read_map(path: Path) -> DiskMap:
         content = yaml.safe_load(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise InputFileError(path, error.strerror or "cannot be read") from None
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
+    except (yaml.YAMLError, ValueError) as error:  # ValueError: no UTF-8, a date or a number that there is not
         raise InputFileError(path, f"is not YAML: {' '.join(str(error).split())}") from None
+    except RecursionError:
+        raise InputFileError(path, "is not a map: brackets in brackets in brackets") from None
     if not isinstance(content, Mapping) or set(content) - {"obstacles", "name", "about"}:
         raise InputFileError(path, "has to hold 'obstacles' (and may hold 'name' and 'about'), nothing else")
     entries = content.get("obstacles")
@@ -113,11 +116,16 @@ def _obstacle(path: Path, k: int, entry: Any) -> tuple[float, float, float]:
     where = f"obstacles[{k}]"
     if not isinstance(entry, Mapping) or set(entry) != {"center", "radius"}:
         raise InputFileError(path, f"{where} has to hold 'center' and 'radius'")
+    center = entry["center"]
     try:
-        x, y = (float(part) for part in entry["center"])
+        if not isinstance(center, list):
+            raise TypeError
+        x, y = (float(part) for part in center)
         radius = float(entry["radius"])
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputFileError(path, f"{where}: 'center' has to be two numbers, 'radius' one") from None
     if not np.isfinite([x, y, radius]).all() or radius <= 0.0:
         raise InputFileError(path, f"{where}: numbers have to be finite and the radius above 0")
+    if max(abs(x), abs(y), radius) > FARTHEST:
+        raise InputFileError(path, f"{where}: the disk has radius 1; numbers above {FARTHEST:g} are taken for a slip")
     return x, y, radius

@@ -23,6 +23,7 @@ from swarmscope.disk.runs import Problem
 from swarmscope.errors import InputFileError, SwarmscopeError
 
 FUNCTION = "compute_gradients"
+HUGE = 1e100
 SIGNATURE = f"{FUNCTION}(state, targets, obstacles, r)"
 
 STARTER = '''"""A controller for the unit disk. Try it: swarmscope disk run {name} --map c0 --permutation 0,3,1,4,2"""
@@ -75,7 +76,7 @@ class UserController:
             begun = time.perf_counter()
             try:
                 answer = self._functions[b](*given)
-            except Exception as error:
+            except (Exception, SystemExit, GeneratorExit) as error:
                 raise UserControllerError(f"{self._where(b, step)}: {raised(error, self._path)}") from None
             self.calls += 1
             self.seconds += time.perf_counter() - begun
@@ -89,6 +90,9 @@ class UserController:
             kind = found.dtype.kind
         except ValueError:
             shape, kind = ("ragged",), "O"
+        except Exception as error:  # the conversion is code of the library that the answer comes from
+            what = f"a {type(answer).__name__}, which is no array: {one_line(error)}"
+            raise UserControllerError(f"{self._where(b, step)}: returned {what}") from None
         if shape != wanted:
             shown = "nothing (None)" if answer is None else f"an array of shape {shape}"
             raise UserControllerError(f"{self._where(b, step)}: returned {shown}, wanted {state_shape}")
@@ -101,7 +105,9 @@ class UserController:
                 f"{self._where(b, step)}: the velocity of robot {robot} is {numbers[robot].tolist()}, "
                 "wanted finite numbers"
             )
-        return numbers
+        # Squares of such numbers overflow; the direction is all that counts.
+        huge = np.abs(numbers).max(axis=1, keepdims=True)
+        return np.where(huge > HUGE, numbers / np.maximum(huge, 1.0), numbers)
 
     def _where(self, b: int, step: int) -> str:
         permutation = ",".join(str(k) for k in self._problem.permutation[b])
@@ -117,7 +123,7 @@ def compiled(path: Path) -> CodeType:
         raise InputFileError(path, error.strerror or "cannot be read") from None
     except SyntaxError as error:
         raise InputFileError(path, f"is not Python: line {error.lineno}: {error.msg}") from None
-    except ValueError as error:
+    except (ValueError, RecursionError, MemoryError) as error:
         raise InputFileError(path, f"is not Python: {error}") from None
 
 
@@ -126,7 +132,7 @@ def function_of(path: Path, code: CodeType) -> Callable[..., Any]:
     space: dict[str, Any] = {"__name__": path.stem, "__file__": str(path)}
     try:
         exec(code, space)  # noqa: S102 - running the user's own file is what the user asked for
-    except Exception as error:
+    except (Exception, SystemExit, GeneratorExit) as error:
         raise InputFileError(path, raised(error, path)) from None
     function: Callable[..., Any] | None = space.get(FUNCTION)
     if function is None or not callable(function):
@@ -145,11 +151,19 @@ def raised(error: BaseException, path: Path) -> str:
     """Return what was raised, and in which line of the user's file."""
     lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
     place = f" in line {lines[-1]}" if lines else ""
-    return f"raised {type(error).__name__}{place}: {error}"
+    message = one_line(error)
+    return f"raised {type(error).__name__}{place}{': ' if message else ''}{message}"
+
+
+def one_line(error: BaseException) -> str:
+    """Return the message of an error in one line."""
+    return " ".join(str(error).split())
 
 
 def write_starter(path: Path) -> Path:
-    """Write a controller to begin with. Errors: InputFileError if the file is there already."""
+    """Write a controller to begin with. Errors: InputFileError if the file is there already or is not named .py."""
+    if path.suffix != ".py":
+        raise InputFileError(path, "a controller is a file whose name ends in .py")
     try:
         with path.open("x", encoding="utf-8") as file:
             file.write(STARTER.format(name=path.name))

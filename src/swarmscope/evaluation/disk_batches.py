@@ -123,13 +123,20 @@ def play_all(
         for part in parts:
             take(part, play_batch(choice, of.part(part)))
         return Result(whole, calls, seconds)
+    others, finished = set(multiprocessing.active_children()), False
     pool = ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), initializer=start_worker)
     try:
         pending = {pool.submit(play_batch, choice, of.part(part)): part for part in parts}
         for future in as_completed(pending):
             take(pending[future], future.result())
+        finished = True
     except BrokenProcessPool:
         raise SwarmscopeError(f"{choice.label}: a worker process died (out of memory?); try --workers 1") from None
     finally:
+        workers_of_ours = set(multiprocessing.active_children()) - others
         pool.shutdown(wait=False, cancel_futures=True)
+        if not finished:
+            # A run of a user's controller may take minutes, or never end: nobody waits for those under way.
+            for worker in workers_of_ours:
+                worker.terminate()
     return Result(whole, calls, seconds)

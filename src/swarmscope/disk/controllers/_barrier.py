@@ -9,8 +9,9 @@ A control-barrier-function program in discrete time. Its constraints are half pl
 * the rim, which is not convex seen from inside: ``room = sqrt(1 - s^2) - |x|`` for steps of length s.
 
 All in lengths per step. Standing still obeys the first two always, so the program is never infeasible for them; where
-the rim's constraint makes it so, the robot stands, which cannot collide either. So from a start without contact
-there is no contact in any step nor between steps, whatever the wishes, if all robots obey this.
+the rim's constraint makes it so, or leaves only what is too fast, the robot stands, which cannot collide either. So
+from a start without contact there is no contact in any step nor between steps, whatever the wishes, if all robots obey
+this.
 """
 
 from __future__ import annotations
@@ -58,7 +59,7 @@ def nearest_admissible(
         if over * over < least and _worst(px, py, planes, count) <= SLACK:
             least, bx, by = over * over, px, py
     if least < math.inf:
-        return bx, by
+        return _cut(bx, by, state[i, 0], state[i, 1], stride)
     for k in range(count):
         for m in range(k):
             turn = planes[k, 0] * planes[m, 1] - planes[k, 1] * planes[m, 0]
@@ -69,7 +70,22 @@ def nearest_admissible(
             away = (px - ux) * (px - ux) + (py - uy) * (py - uy)
             if away < least and _worst(px, py, planes, count) <= SLACK:
                 least, bx, by = away, px, py
-    return bx, by
+    return _cut(bx, by, state[i, 0], state[i, 1], stride)
+
+
+@jit
+def _cut(ux: float, uy: float, x: float, y: float, stride: float) -> tuple[float, float]:
+    """Return u cut to length 1, or 0 where that would leave the disk.
+
+    At the rim 0 is not admissible and what is can be longer than 1; a part of it obeys all but the rim.
+    """
+    size = math.sqrt(ux * ux + uy * uy)
+    if size <= 1.0:
+        return ux, uy
+    ux, uy = ux / size, uy / size
+    if math.hypot(x + stride * ux, y + stride * uy) > 1.0 + SLACK:
+        return 0.0, 0.0
+    return ux, uy
 
 
 @jit

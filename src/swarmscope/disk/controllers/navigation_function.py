@@ -58,9 +58,18 @@ from swarmscope.disk.runs import Problem
 SUMMARY = "descends a navigation function of all robots: shortest ways against nearness, turned to pass each other"
 KNOWS = "all positions and goals, what the others did in the last step, all obstacles"
 GUARANTEES = (
-    "never a collision, in discrete time and from any free state; a robot alone always arrives; together the potential "
-    "falls (short steps), but may have minima besides the goals: next to walls, in passages for one, in a throng"
+    "never a collision, in discrete time and from any free state; a robot alone always arrives, if the way leaves it "
+    "0.0001 on both sides; together the potential falls (short steps), but may have minima besides the goals: next to "
+    "walls, in passages for one, in a throng"
 )
+
+LIMITS = {
+    "k": (1e-3, 1e9),
+    "power": (0.01, 100.0),
+    "smooth": (1e-6, 1.0),
+    "steer": (0, 1),
+    "horizon": (1e-6, 1000.0),
+}
 
 MARGINS = (0.004, 0.002, 0.001, 0.0005, 0.0002, 0.0001)
 """Widths of the strip round obstacles in which they push, widest first; the first that bars no way is taken."""

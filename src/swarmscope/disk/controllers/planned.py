@@ -19,6 +19,8 @@ GUARANTEES = (
     "neither arrival nor the best plan is guaranteed"
 )
 
+LIMITS = {"attempts": (1, 1000), "drafts": (0, 1000), "robot_gap": (0.0, 1.0), "tick": (1, 1000)}
+
 SAG = 0.008
 """Largest distance between an arc and the chord of one tick, as a part of a robot's radius."""
 MANY = 10

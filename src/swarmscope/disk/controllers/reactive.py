@@ -40,9 +40,11 @@ from swarmscope.disk.runs import Problem
 SUMMARY = "shortest ways, manoeuvres that give way in a fixed order, and a barrier against contact"
 KNOWS = "positions and velocities of all robots, its own goal, all obstacles; no goals or plans of others"
 GUARANTEES = (
-    "no contact in discrete time, if all robots run it and start apart; arrival is not proven: nobody waits in a "
-    "circle, but a robot can be kept from its goal by others that stand for good"
+    "no contact in discrete time, if all robots run it and start apart; arrival is not proven: who waits for each "
+    "other stops doing so after a while (patience), but a robot can be kept from its goal by others at their goals"
 )
+
+LIMITS = {"horizon": (1e-3, 1000.0), "stride": (0.05, 1000.0), "gain": (1e-3, 0.999), "margin": (0.0, 1.0)}
 
 TURNS_DEG = (3, 6, 9, 12, 16, 20, 25, 30, 40, 50, 60, 75, 90, 110, 135, 160)
 LENGTHS = (1.0, 2.0, 4.0, 8.0)

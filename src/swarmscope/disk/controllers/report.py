@@ -13,6 +13,8 @@ SUMMARY = "the report's own: attraction, two repulsions, and a turn by 90 degree
 KNOWS = "all positions, its own goal, all obstacles"
 GUARANTEES = "nothing: 7 of the 600 runs circle until the steps run out"
 
+LIMITS: dict[str, tuple[float, float]] = {}
+
 FLOOR = 1e-5
 """Gaps are not taken as smaller than this, report section 2.2."""
 AHEAD = 0.05

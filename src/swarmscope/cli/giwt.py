@@ -1,0 +1,202 @@
+"""``swarmscope giwt``: expert data, training, evaluation and export of the networks that pick a side."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import yaml
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.table import Table
+
+from swarmscope.cli._console import PlainConsole
+from swarmscope.errors import ConfigError, MissingExtraError
+from swarmscope.learning.generate import DRIVEN, PLACED, generate, totals, verify
+
+ALL = ("placed", "driven", "all")
+
+
+def data_command(folder: Path, sets: Sequence[str], samples: int, workers: int | None, check: bool) -> None:
+    """Bring a data folder to ``samples`` samples for each set, or check what is there; print a table."""
+    if check:
+        manifest = verify(folder)
+    else:
+        with _bar() as bar:
+            jobs: dict[str, Any] = {}
+
+            def report(name: str, done: int, wanted: int) -> None:
+                if name not in jobs:
+                    jobs[name] = bar.add_task(name, total=wanted, note="")
+                bar.update(jobs[name], completed=min(done, wanted), note=f"{done} of {wanted} samples")
+
+            manifest = generate(folder, expand(sets), samples, workers, report)
+    table = Table(title=f"expert data in {folder}")
+    columns = ("samples", "train", "validation", "test", "left", "maps", "looked_at", "unreachable", "nothing_ahead", "tie")
+    for column in ("set", *columns, "neighbours"):
+        table.add_column(column, justify="right")
+    for name, row in totals(manifest).items():
+        table.add_row(name, *(str(row[c]) for c in columns), f"{row['neighbours'] / row['samples']:.2f}")
+    PlainConsole(width=None if sys.stdout.isatty() else 150).print(table)
+    if check:
+        print("all shards are there and have the checksums of the manifest")
+
+
+def expand(sets: Sequence[str]) -> list[str]:
+    """Return the sets that a list of names and groups stands for."""
+    found: list[str] = []
+    for name in sets:
+        found += {"placed": PLACED, "driven": DRIVEN, "all": PLACED + DRIVEN}.get(name, [name])
+    return list(dict.fromkeys(found))
+
+
+def train_command(
+    config: str, data: Path, out: Path | None, init: Path | None, changes: Sequence[str]
+) -> None:
+    """Train a network, or go on training it."""
+    from swarmscope.learning.config import read_config
+
+    _need("torch", "torch_geometric", "safetensors", "tensorboard")
+    from swarmscope.learning.train import train
+
+    chosen = read_config(config, read_changes(changes))
+    place = out or Path("runs") / "giwt" / chosen.network
+    with _bar() as bar:
+        job = bar.add_task(chosen.network, total=None, note="reads data")
+
+        def report(epoch: int, done: int, steps: int, note: str) -> None:
+            bar.update(
+                job, total=chosen.epochs * steps, completed=epoch * steps + done,
+                note=f"epoch {epoch + 1} of {chosen.epochs}: {note}",
+            )  # fmt: skip
+            if note.startswith("validation"):
+                bar.console.print(f"epoch {epoch + 1}: {note}", highlight=False)
+
+        history = train(chosen, data, place, init, report)
+    best = min(history, key=lambda row: row["validation_loss"])
+    print(
+        f"{chosen.network}: best of {len(history)} epochs is {best['epoch']}: validation loss "
+        f"{best['validation_loss']:.4f}, accuracy {100 * best['validation_accuracy']:.2f} %"
+    )
+    print(place / "best.safetensors")
+
+
+def eval_command(runs: Sequence[Path], data: Path, sets: Sequence[str], split: str, out: Path | None) -> None:
+    """Score trained networks on every set and compare the first with the others."""
+    _need("torch", "torch_geometric", "safetensors")
+    from swarmscope.learning.evaluate import ahead_of, judge, majority, open_trained, read_test, regret, share
+    from swarmscope.learning.records import SPLITS
+
+    if split not in SPLITS:
+        raise ConfigError("--split", f"'{split}' is none of {', '.join(SPLITS)}")
+    networks = [open_trained(path) for path in runs]
+    shards = read_test(data, expand(sets), split)
+    result: dict[str, Any] = {"data": str(data), "split": split, "sets": {}}
+    table = Table(title=f"accuracy on {split} maps, % (95 % interval over maps)")
+    for column in ("set", "samples", "majority", *(n.label for n in networks)):
+        table.add_column(column, justify="right")
+    with _bar() as bar:
+        job = bar.add_task("eval", total=len(networks) * sum(s.samples for s in shards.values()), note="")
+        for name, shard in shards.items():
+            verdicts = [judge(one, shard, lambda done: bar.advance(job, done)) for one in networks]
+            rows = []
+            for one, verdict in zip(networks, verdicts, strict=True):
+                row = {"label": one.label, "checkpoint": str(one.path), "accuracy": share(verdict.hit, verdict.map)}
+                row |= {"regret_m": regret(verdict), "first_ahead": ahead_of(verdicts[0], verdict)}
+                rows.append({k: v._asdict() if hasattr(v, "_asdict") else v for k, v in row.items()})
+            most = majority(shard)
+            result["sets"][name] = {"samples": shard.samples, "majority": most, "networks": rows}
+            table.add_row(name, str(shard.samples), f"{100 * most:.1f}", *(_words(r["accuracy"]) for r in rows))
+            if out is not None:
+                _save(out, result)
+    means = [_mean(result, k) for k in range(len(networks))]
+    table.add_row("mean", "", "", *(f"{100 * value:.2f}" for value in means))
+    result["mean_accuracy"] = {one.label: value for one, value in zip(networks, means, strict=True)}
+    console = PlainConsole(width=None if sys.stdout.isatty() else 170)
+    console.print(table)
+    if len(networks) > 1:
+        console.print(_difference_table(result, [one.label for one in networks]))
+    if out is not None:
+        _save(out, result)
+        print(out)
+
+
+def export_command(run: Path, out: Path, scores: Path | None) -> None:
+    """Write what a robot runs."""
+    _need("torch", "torch_geometric", "safetensors", "onnx", "onnxruntime")
+    from swarmscope.learning.export import export
+    from swarmscope.learning.train import BEST
+
+    card = {} if scores is None else {"scores": json.loads(scores.read_text(encoding="utf-8"))}
+    difference = export(run / BEST if run.is_dir() else run, out, card)
+    print(f"{out}: ONNX Runtime and PyTorch differ by at most {difference:.1e}")
+
+
+def read_changes(changes: Sequence[str]) -> dict[str, Any]:
+    """Return KEY=VALUE words as a mapping, values read as YAML."""
+    found: dict[str, Any] = {}
+    for text in changes:
+        key, equals, value = text.partition("=")
+        if not equals or not key:
+            raise ConfigError("--set", f"'{text}' is not KEY=VALUE")
+        try:
+            found[key] = yaml.safe_load(value)
+        except yaml.YAMLError:
+            raise ConfigError("--set", f"'{value}' is no value") from None
+        if isinstance(found[key], str):
+            try:
+                found[key] = float(found[key])  # YAML 1.1 takes 1e-3 for text
+            except ValueError:
+                pass
+    return found
+
+
+def _need(*packages: str) -> None:
+    """Raise MissingExtraError unless the packages of the extra are installed."""
+    from importlib.util import find_spec
+
+    if not all(find_spec(name) for name in packages):
+        raise MissingExtraError("swarmscope giwt", "learn")
+
+
+def _save(out: Path, result: dict[str, Any]) -> None:
+    from swarmscope.learning.records import write_atomically
+
+    write_atomically(out, (json.dumps(result, indent=1) + "\n").encode())
+
+
+def _words(score: dict[str, float]) -> str:
+    return f"{100 * score['value']:.2f} ({100 * score['low']:.1f}-{100 * score['high']:.1f})"
+
+
+def _mean(result: dict[str, Any], k: int) -> float:
+    values = [entry["networks"][k]["accuracy"]["value"] for entry in result["sets"].values()]
+    return float(sum(values) / len(values))
+
+
+def _difference_table(result: dict[str, Any], labels: list[str]) -> Table:
+    table = Table(title=f"{labels[0]} minus the others, percentage points; and metres lost by wrong sides")
+    for column in ("set", *labels[1:], *(f"{label} [m]" for label in labels)):
+        table.add_column(column, justify="right")
+    for name, entry in result["sets"].items():
+        rows = entry["networks"]
+        ahead = [
+            f"{100 * r['first_ahead']['value']:+.2f} ({100 * r['first_ahead']['low']:+.2f}..{100 * r['first_ahead']['high']:+.2f})"
+            for r in rows[1:]
+        ]
+        table.add_row(name, *ahead, *(f"{r['regret_m']['value']:.3f}" for r in rows))
+    return table
+
+
+@contextmanager
+def _bar() -> Iterator[Progress]:
+    columns = (
+        TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[note]}"), TimeElapsedColumn(),
+        TimeRemainingColumn(),
+    )  # fmt: skip
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        yield bar

@@ -1,0 +1,91 @@
+"""What a training is made of: one YAML file, validated."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from swarmscope.errors import ConfigError, InputFileError
+from swarmscope.learning.generate import DRIVEN, PLACED, parse_set
+from swarmscope.onboard.planning._giwt_graph import VIEW_M
+
+FOLDER = Path(__file__).parent.parent / "data" / "training"
+Count = Annotated[int, Field(ge=1)]
+NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+NETWORKS = ("giwt", "gat", "graphsage", "cnn")
+
+
+class TrainingConfig(BaseModel):
+    """One training, complete but for the folders of its data and its results."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    network: Literal["giwt", "gat", "graphsage", "cnn"] = "giwt"
+    sets: list[str] = [*PLACED, *DRIVEN]
+    """Sets of the data folder, by name."""
+    channels: tuple[Count, Count, Count] = (32, 64, 64)
+    stem_stride: Literal[1, 2] = 2
+    use_gain: bool = True
+    use_position: bool = True
+    dropout: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.0
+    view_m: Positive = VIEW_M
+    """Radius of the pictures."""
+    epochs: Count = 20
+    samples_per_epoch: Count = 60_000
+    """Drawn anew for every epoch; all of the training data if it holds fewer."""
+    validation_samples: Count = 20_000
+    batch: Count = 256
+    learning_rate: Positive = 1e-3
+    weight_decay: NotNegative = 1e-2
+    warm_up: NotNegative = 0.5
+    """Epochs until the full learning rate; afterwards it falls along a cosine."""
+    detour_power: NotNegative = 0.0
+    """Samples weigh (detour / 1 m) to this power, between 0.1 and 10: 0 counts errors, 1 counts metres."""
+    patience: Count = 6
+    """Stop after so many epochs without a lower validation loss."""
+    precision: Literal["auto", "float32", "bfloat16"] = "auto"
+    """auto: bfloat16 where the processor computes in it, float32 elsewhere; parameters are always float32."""
+    seed: Annotated[int, Field(ge=0, lt=2**31)] = 0
+    threads: Annotated[int, Field(ge=0)] = 0
+    """Of the CPU, 0 for all."""
+
+
+def read_config(name: str, changes: dict[str, Any] | None = None) -> TrainingConfig:
+    """Return the configuration ``name``: a packaged one (`names`) or a YAML file, with ``changes`` on top."""
+    path = FOLDER / f"{name}.yaml" if name in names() else Path(name)
+    try:
+        values = yaml.safe_load(path.read_text(encoding="utf-8")) or {}
+    except UnicodeDecodeError:
+        raise InputFileError(path, "is not text") from None
+    except OSError as error:
+        why = f"cannot be read ({error.strerror}); packaged ones are {', '.join(names())}"
+        raise InputFileError(path, why) from None
+    except yaml.YAMLError as error:
+        raise InputFileError(path, f"is not YAML ({' '.join(str(error).split())})") from None
+    if not isinstance(values, dict):
+        raise ConfigError(str(path), "a training is a mapping of keys to values")
+    return parse_config(values | (changes or {}), str(path))
+
+
+def parse_config(values: dict[str, Any], where: str) -> TrainingConfig:
+    """Return the configuration in ``values``; a ConfigError names place and problem."""
+    try:
+        config = TrainingConfig.model_validate(values)
+    except ValidationError as error:
+        problem = error.errors()[0]
+        key = ".".join(str(part) for part in problem["loc"]) or "(top)"
+        what = f"unknown key; valid are {', '.join(TrainingConfig.model_fields)}"
+        why = what if problem["type"] == "extra_forbidden" else problem["msg"]
+        raise ConfigError(f"{where}: {key}", why) from None
+    for name in config.sets:
+        parse_set(name)
+    return config
+
+
+def names() -> list[str]:
+    """Return the packaged configurations."""
+    return sorted(path.stem for path in FOLDER.glob("*.yaml"))

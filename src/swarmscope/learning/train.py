@@ -1,0 +1,255 @@
+"""Training: cross-entropy on the expert's sides, with checkpoints after every epoch and the best one kept.
+
+Everything random follows from the seed and the number of the epoch, so that a stopped training goes on as if nothing
+had happened.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+from swarmscope.errors import ConfigError, SwarmscopeError
+from swarmscope.evaluation.provenance import git_revision, versions
+from swarmscope.learning import checkpoints
+from swarmscope.learning.batches import Batch, batches
+from swarmscope.learning.config import TrainingConfig
+from swarmscope.learning.models import Architecture, Chooser
+from swarmscope.learning.records import SPLITS, Shard, concatenate, load, select, split_of, write_atomically
+
+LAST, BEST, HISTORY = "last.safetensors", "best.safetensors", "history.json"
+WEIGHTS = (0.1, 10.0)
+LARGEST_GRADIENT = 5.0
+Report = Callable[[int, int, int, str], None]
+"""Called with epoch, batches done, batches in all, and what there is to say."""
+
+
+class Scores(NamedTuple):
+    """A model on some samples."""
+
+    loss: float
+    accuracy: float
+    regret_m: float
+    """Mean detour taken because of wrong sides [m]."""
+
+
+def architecture_of(config: TrainingConfig) -> Architecture:
+    """Return the architecture that a configuration asks for."""
+    giwt = config.network == "giwt"
+    return Architecture(
+        config.network, tuple(config.channels), config.stem_stride,
+        config.use_gain if giwt else False, config.use_position if giwt else False, config.dropout,
+    )  # fmt: skip
+
+
+def train(
+    config: TrainingConfig,
+    data: Path,
+    out: Path,
+    init: Path | None = None,
+    report: Report | None = None,
+) -> list[dict[str, float]]:
+    """Train, or go on training, in folder ``out``; return the history, a row for each epoch.
+
+    ``init`` is a checkpoint whose encoder is taken over. Raises ConfigError when ``out`` holds another training,
+    SwarmscopeError when the loss is not finite; the last checkpoint stays.
+    """
+    set_up(config.threads, config.seed)
+    device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
+    model = Chooser(architecture_of(config)).to(device, memory_format=torch.channels_last)
+    if init is not None:
+        checkpoints.fill(model.encoder, "model.encoder.", checkpoints.read(init), init)
+    optimizer = torch.optim.AdamW(model.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay)
+    history = _resume(config, out, model, optimizer)
+    training, validation = read_splits(config, data)
+    out.mkdir(parents=True, exist_ok=True)
+    write_atomically(out / "config.json", (config.model_dump_json(indent=1) + "\n").encode())
+    board = _Board(out / "tensorboard")
+    steps = math.ceil(min(config.samples_per_epoch, training.samples) / config.batch)
+    about = {"config": config.model_dump(mode="json"), "versions": all_versions(), "git": git_revision(), "init": None}
+    if init is not None:
+        about["init"] = init.name
+    for epoch in range(len(history), config.epochs):
+        begun = time.perf_counter()
+        row = _epoch(model, optimizer, config, training, epoch, steps, device, report)
+        scores = evaluate(model, validation, config, device)
+        row |= {"validation_loss": scores.loss, "validation_accuracy": scores.accuracy}
+        row |= {"validation_regret_m": scores.regret_m, "wall_s": time.perf_counter() - begun}
+        history.append(row)
+        about["history"] = history
+        if scores.loss <= min(r["validation_loss"] for r in history):
+            checkpoints.write(out / BEST, model, about)
+        checkpoints.write(out / LAST, model, about, optimizer)
+        write_atomically(out / HISTORY, (json.dumps(history, indent=1) + "\n").encode())
+        board.add(epoch, row)
+        if report is not None:
+            report(epoch, steps, steps, f"validation {scores.loss:.4f}, {100 * scores.accuracy:.2f} %")
+        if epoch - int(np.argmin([r["validation_loss"] for r in history])) >= config.patience:
+            break
+    board.close()
+    return history
+
+
+def set_up(threads: int, seed: int) -> None:
+    """Set number of threads and seed; results depend on both."""
+    torch.set_num_threads(threads or len(os.sched_getaffinity(0)))
+    torch.manual_seed(seed)
+
+
+def all_versions() -> dict[str, str]:
+    """Return the versions that a trained model depends on."""
+    import torch_geometric
+
+    return versions() | {"torch": torch.__version__, "torch_geometric": torch_geometric.__version__}
+
+
+def read_splits(config: TrainingConfig, data: Path) -> tuple[Shard, Shard]:
+    """Return training and validation data."""
+    whole = concatenate(list(load(data, list(config.sets)).values()))
+    splits = split_of(whole.map)
+    training, validation = (select(whole, splits == SPLITS.index(s)) for s in ("train", "validation"))
+    if not training.samples or not validation.samples:
+        raise ConfigError(str(data), "has no samples for training or for validation; generate more")
+    if validation.samples > config.validation_samples:
+        chosen = np.zeros(validation.samples, np.bool_)
+        order = np.random.default_rng([config.seed, 1]).permutation(validation.samples)
+        chosen[order[: config.validation_samples]] = True
+        validation = select(validation, chosen)
+    return training, validation
+
+
+def _resume(config: TrainingConfig, out: Path, model: Chooser, optimizer: torch.optim.Optimizer) -> list[dict[str, float]]:
+    """Load the last checkpoint in ``out`` if there is one; return the history so far."""
+    path = out / LAST
+    if not path.exists():
+        return []
+    found = checkpoints.read(path)
+    checkpoints.expect(found, model.architecture, path)
+    longer = {"epochs", "patience", "threads"}
+    before, now = found.about["config"], config.model_dump(mode="json")
+    for key in now:
+        if key not in longer and before.get(key) != now[key]:
+            raise ConfigError(str(out), f"holds a training with {key}: {before.get(key)}, not {now[key]}")
+    checkpoints.fill(model, "model.", found, path)
+    checkpoints.restore_optimizer(optimizer, found)
+    return list(found.about["history"])
+
+
+def _epoch(
+    model: Chooser,
+    optimizer: torch.optim.Optimizer,
+    config: TrainingConfig,
+    training: Shard,
+    epoch: int,
+    steps: int,
+    device: torch.device,
+    report: Report | None,
+) -> dict[str, float]:
+    """Train on one epoch's samples; return loss and accuracy met on the way."""
+    rng = np.random.default_rng([config.seed, 2, epoch])
+    torch.manual_seed(config.seed * 10_007 + epoch)
+    if training.samples > config.samples_per_epoch:
+        chosen = np.zeros(training.samples, np.bool_)
+        chosen[rng.permutation(training.samples)[: config.samples_per_epoch]] = True
+        training = select(training, chosen)
+    model.train()
+    loss_sum, right, seen = 0.0, 0, 0
+    for step, batch in enumerate(batches(training, config.batch, config.view_m, config.network == "cnn", rng)):
+        if len(batch.right) < 2:
+            continue  # batch normalisation needs two
+        for group in optimizer.param_groups:
+            group["lr"] = config.learning_rate * schedule(epoch + step / steps, config)
+        with autocast(config, device):
+            logits = forward(model, batch, device).float()
+        classes = torch.from_numpy(batch.right).to(device)
+        weights = torch.from_numpy(np.clip(batch.detour_m, *WEIGHTS) ** config.detour_power).to(device)
+        loss = (functional.cross_entropy(logits, classes, reduction="none") * weights).sum() / weights.sum()
+        if not bool(torch.isfinite(loss)):
+            raise SwarmscopeError(
+                f"the loss is {float(loss)} in epoch {epoch + 1}, batch {step + 1}: lower learning_rate; "
+                "the checkpoint of the epoch before is kept"
+            )
+        optimizer.zero_grad(set_to_none=True)
+        loss.backward()  # type: ignore[no-untyped-call]
+        torch.nn.utils.clip_grad_norm_(model.parameters(), LARGEST_GRADIENT)
+        optimizer.step()
+        loss_sum += float(loss) * len(classes)
+        right += int((logits.argmax(1) == classes).sum())
+        seen += len(classes)
+        if report is not None:
+            report(epoch, step + 1, steps, f"loss {loss_sum / seen:.4f}")
+    return {"epoch": epoch + 1, "samples": seen, "loss": loss_sum / seen, "accuracy": right / seen}
+
+
+def schedule(progress: float, config: TrainingConfig) -> float:
+    """Return the share of the full learning rate after ``progress`` epochs."""
+    if progress < config.warm_up:
+        return max(1e-3, progress / config.warm_up)
+    return 0.5 * (1.0 + math.cos(math.pi * min(1.0, (progress - config.warm_up) / max(1e-9, config.epochs - config.warm_up))))
+
+
+def forward(model: Chooser, batch: Batch, device: torch.device) -> Tensor:
+    """Return the logits (B, 2) of a batch."""
+    maps = torch.from_numpy(batch.maps).to(device, torch.float32).contiguous(memory_format=torch.channels_last)
+    arrays = (batch.slots, batch.cells, batch.gains, batch.present)
+    out: Tensor = model(maps, *(torch.from_numpy(a).to(device) for a in arrays))
+    return out
+
+
+def autocast(config: TrainingConfig, device: torch.device) -> Any:
+    """Return the context in which the network is computed."""
+    half = config.precision == "bfloat16" or (config.precision == "auto" and _computes_bfloat16(device))
+    return torch.autocast(device.type, torch.bfloat16, enabled=half)
+
+
+def _computes_bfloat16(device: torch.device) -> bool:
+    if device.type == "cuda":
+        return torch.cuda.is_bf16_supported()
+    return bool(torch.cpu._is_avx512_bf16_supported())
+
+
+@torch.no_grad()
+def evaluate(model: Chooser, data: Shard, config: TrainingConfig, device: torch.device) -> Scores:
+    """Return the model's scores on ``data``, in the precision of the training."""
+    model.eval()
+    loss, right, regret = 0.0, 0, 0.0
+    for batch in batches(data, 2 * config.batch, config.view_m, config.network == "cnn"):
+        with autocast(config, device):
+            logits = forward(model, batch, device).float()
+        classes = torch.from_numpy(batch.right).to(device)
+        loss += float(functional.cross_entropy(logits, classes, reduction="sum"))
+        hit = (logits.argmax(1) == classes).cpu().numpy()
+        right += int(hit.sum())
+        regret += float(batch.detour_m[~hit].sum())
+    n = data.samples
+    return Scores(loss / n, right / n, regret / n)
+
+
+class _Board:
+    """Writes what TensorBoard reads."""
+
+    def __init__(self, folder: Path) -> None:
+        from torch.utils.tensorboard import SummaryWriter
+
+        self._writer = SummaryWriter(str(folder))  # type: ignore[no-untyped-call]
+
+    def add(self, epoch: int, row: dict[str, float]) -> None:
+        """Add the figures of an epoch."""
+        for name, value in row.items():
+            if name != "epoch":
+                self._writer.add_scalar(name, value, epoch + 1)  # type: ignore[no-untyped-call]
+        self._writer.flush()  # type: ignore[no-untyped-call]
+
+    def close(self) -> None:
+        """Close the file."""
+        self._writer.close()  # type: ignore[no-untyped-call]
