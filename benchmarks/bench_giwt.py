@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from bench_step import prepared, step_us
 
+from bench_step import prepared, step_us
 from swarmscope.errors import SwarmscopeError
 from swarmscope.evaluation.scenario import make_rig_of, parse_scenario
 from swarmscope.onboard.percept import DECISION, new_scratch
@@ -85,12 +85,14 @@ def main() -> None:
     pictures = np.zeros((ROBOTS, 1, CHANNELS, CELLS, CELLS), np.float32)
     features, cells, gains = empty_graph()
 
+    known = (decisions, rig, params, network.view_m, features[0], cells[0], gains[0])
+
     def picture(i: int) -> None:
         look(i, ranges, percepts, rig, codes[i])
-        draw(codes[i], float(percepts["goal_bearing"][i]), rig, pictures[i, 0])
+        draw(codes[i], float(percepts["goal_bearing"][i]), network.view_m, rig, pictures[i, 0])
 
     def graph(i: int) -> None:
-        n = gather(i, percepts, shared, memory, decisions, rig, params, features[0], cells[0], gains[0]) + 1
+        n = gather(i, percepts, shared, memory, *known) + 1
         network.p_left(features[:, :n], cells[:, :n], gains[:, :n])
 
     def answer(i: int) -> None:
@@ -101,7 +103,7 @@ def main() -> None:
     encoded = best_us(lambda i: network.encode(pictures[i]))
     features[0, 0] = network.encode(pictures[0])[0]
     fused, packed = best_us(graph), best_us(answer)
-    heard = gather(0, percepts, shared, memory, decisions, rig, params, features[0], cells[0], gains[0])
+    heard = gather(0, percepts, shared, memory, *known)
 
     def tick(before: tuple[Any, ...]) -> float:
         best = np.inf

@@ -43,6 +43,12 @@ def test_a_whole_model_loads_once(folder):
     giwt.with_model(folder).check_available()
 
 
+def test_the_radius_of_the_pictures_is_the_models(folder):
+    assert load(folder).view_m == 2.5
+    card(folder, view_m=4)
+    assert load(folder).view_m == 4.0
+
+
 def test_another_model_at_the_same_place_is_another_model(folder):
     first, state = load(folder), giwt.with_model(folder).model_state()
     make_model(folder, seed=1)
@@ -71,6 +77,8 @@ def test_a_card_that_is_no_json(folder, text):
         ({"network": "mlp"}, "unknown network 'mlp'"),
         ({"network": "gat"}, "is a network 'gat'; this planner runs giwt"),
         ({"files": []}, "'files' must map"),
+        ({"view_m": 0.0}, "'view_m' is 0.0"),
+        ({"view_m": "wide"}, "'view_m' is 'wide'"),
         ({"files": {"encoder.onnx": "0"}}, "no SHA-256 of decider.onnx|SHA-256 differs"),
         ({"files": {"encoder.onnx": "0", "decider.onnx": "0"}}, "SHA-256 differs"),
     ],

@@ -40,7 +40,6 @@ from swarmscope.onboard.planning._giwt_graph import (
     FEATURES,
     GRID_M,
     OWN_CELL,
-    VIEW_M,
     information_gain_series,
     position_cell,
     quantise,
@@ -229,15 +228,15 @@ def _think(
     for q in range(int(shared["ask_n"][i])):
         code = int(shared["ask_direction"][i, q])
         if code >= 0:
-            draw(codes, direction_of(code) - float(percepts["compass"][i]), rig, picture[0])
+            draw(codes, direction_of(code) - float(percepts["compass"][i]), network.view_m, rig, picture[0])
             put_answer(i, q, network.encode(picture)[0], sent, percepts, shared, decisions)
     if memories["stage"][i] != CHOOSES or memories["toss"][i]:
         return
-    draw(codes, float(percepts["goal_bearing"][i]), rig, picture[0])
+    draw(codes, float(percepts["goal_bearing"][i]), network.view_m, rig, picture[0])
     own = network.encode(picture)
     features, cells, gains = empty_graph()
     features[0, 0] = own[0]
-    n = gather(i, percepts, shared, memories, decisions, rig, params, features[0], cells[0], gains[0])
+    n = gather(i, percepts, shared, memories, decisions, rig, params, network.view_m, features[0], cells[0], gains[0])
     k = n + 1
     p_left = float(network.p_left(features[:, :k], cells[:, :k], gains[:, :k])[0])
     if n > 0:  # what each would say alone, for people to read
@@ -269,10 +268,13 @@ def look(i: int, ranges: np.ndarray, percepts: np.ndarray, rig: Rig, codes: np.n
 
 
 @jit
-def draw(codes: np.ndarray, target: float, rig: Rig, picture: np.ndarray) -> None:
-    """Draw range codes (M,) into ``picture (2, 101, 101)``, x along ``target`` [rad, body frame]."""
+def draw(codes: np.ndarray, target: float, view_m: float, rig: Rig, picture: np.ndarray) -> None:
+    """Draw what range codes (M,) show within ``view_m`` [m], x along ``target`` [rad, body frame].
+
+    ``picture`` is (2, 101, 101) float32.
+    """
     sensor = rig.sensor
-    draw_map(codes, sensor.angle_min, sensor.increment, target, VIEW_M, CELL_ANGLE, CELL_DISTANCE, picture)
+    draw_map(codes, sensor.angle_min, sensor.increment, target, view_m, CELL_ANGLE, CELL_DISTANCE, picture)
 
 
 @jit
@@ -299,6 +301,7 @@ def gather(
     decisions: np.ndarray,
     rig: Rig,
     params: Params,
+    view_m: float,
     features: np.ndarray,
     cells: np.ndarray,
     gains: np.ndarray,
@@ -321,7 +324,7 @@ def gather(
             continue
         east, north = shared[i]["track_x"][t], shared[i]["track_y"][t]
         x, y = c * east + s * north, c * north - s * east
-        gain = information_gain_series(math.sqrt(x * x + y * y), VIEW_M)
+        gain = information_gain_series(math.sqrt(x * x + y * y), view_m)
         decision["heard_id"][n], decision["heard_f"][n] = memory["asked_id"][a], gain
         decision["heard_side"][n] = 1 if y >= 0.0 else -1
         n += 1

@@ -17,7 +17,7 @@ import numpy as np
 
 from swarmscope.errors import InputFileError, MissingExtraError
 from swarmscope.onboard.perception.local_map import CELLS, CHANNELS
-from swarmscope.onboard.planning._giwt_graph import FEATURES
+from swarmscope.onboard.planning._giwt_graph import FEATURES, VIEW_M
 
 FORMAT = "swarmscope-giwt"
 VERSION = 1
@@ -27,6 +27,8 @@ NETWORKS = ("giwt", "gat", "graphsage", "cnn")
 ALONE = frozenset({"cnn"})
 """Networks that look at the robot's own features only: with them nobody is asked."""
 SHIPPED = Path(__file__).resolve().parents[2] / "data" / "models"
+VIEWS_M = (0.2, 20.0)
+"""Smallest and largest radius of pictures."""
 LARGEST_BYTES = 256 * 2**20
 """Larger files are not read."""
 
@@ -59,6 +61,8 @@ class Network:
     def __init__(self, folder: Path, card: dict[str, Any]) -> None:
         self.folder = folder
         self.alone = card["network"] in ALONE
+        self.view_m = float(card["view_m"])
+        """Radius of the pictures that it was trained with."""
         self._encoder = _session(folder / ENCODER, _checked(folder / ENCODER, card["files"][ENCODER]))
         self._decider = _session(folder / DECIDER, _checked(folder / DECIDER, card["files"][DECIDER]))
         self._inputs = [port.name for port in self._decider.get_inputs()]
@@ -111,14 +115,17 @@ def read_card(folder: Path, networks: frozenset[str] = frozenset(NETWORKS)) -> d
     for name in PORTS:
         if not isinstance(files.get(name), str):
             raise InputFileError(path, f"'files' has no SHA-256 of {name}")
-    return card | {"sha256": hashlib.sha256(text).hexdigest()}
+    view = card.get("view_m", VIEW_M)
+    if isinstance(view, bool) or not isinstance(view, int | float) or not VIEWS_M[0] <= view <= VIEWS_M[1]:
+        raise InputFileError(path, f"'view_m' is {view!r}, must be a radius of {VIEWS_M[0]:g} to {VIEWS_M[1]:g} m")
+    return card | {"view_m": view, "sha256": hashlib.sha256(text).hexdigest()}
 
 
 def load_network(folder: Path, planner: str, networks: frozenset[str] = frozenset(NETWORKS)) -> Network:
     """Return the model in ``folder``; loaded once as long as its card stays the same."""
     _runtime(planner)
     card = read_card(folder, networks)
-    return _load(folder, json.dumps({key: card[key] for key in ("network", "files", "sha256")}, sort_keys=True))
+    return _load(folder, json.dumps({key: card[key] for key in ("network", "files", "view_m", "sha256")}, sort_keys=True))
 
 
 @lru_cache(maxsize=8)
