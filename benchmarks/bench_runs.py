@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from swarmscope.errors import SwarmscopeError
 from swarmscope.evaluation.runner import find_references, play
 from swarmscope.evaluation.scenario import complete, make_setup, parse_scenario
 from swarmscope.evaluation.sides import make_advice
@@ -74,6 +75,11 @@ def main() -> None:
     )
     print("a million units on 1, 16, 1000 cores")
     for planner in planner_names():
+        try:
+            getattr(load_planner(planner), "check_available", lambda: None)()
+        except SwarmscopeError as error:
+            print(f"{planner:10s} left out: {error}")
+            continue
         costs(planner, 0)  # loads the kernels
         rows = [costs(planner, seed) for seed in seeds]
         mean = {key: 1e3 * float(np.mean([row[key] for row in rows])) for key in rows[0]}

@@ -19,12 +19,13 @@ BLOCKED = (
     "yaml",
     "PIL",
     "navground",
+    "onnxruntime",
     "swarmscope.sim",
     "swarmscope.tasks",
 )
 ONBOARD = sorted(SRC.glob("onboard/**/*.py"))
-LIBRARIES = {"orca.py": "navground"}
-"""A baseline that a library plans; the library is loaded when the planner is used."""
+LIBRARIES = {"orca.py": "navground", "_giwt_network.py": "onnxruntime"}
+"""Planners that a library helps; the library is loaded when the planner is used."""
 SOURCES = sorted(SRC.glob("**/*.py"))
 
 

@@ -44,7 +44,7 @@ def test_versions() -> None:
 
 
 def test_missing_package_is_unknown() -> None:
-    assert provenance._installed_version("no-such-package-here") == "unknown"
+    assert provenance.installed_version("no-such-package-here") == "unknown"
 
 
 def test_clean_then_changed_then_untracked(checkout: Path) -> None:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from helpers import DT, place_sim
+from swarmscope.onboard.sharing.message import KIND_DIRECTED_REQUEST, KIND_FEATURES, KIND_LATENT, KIND_REQUEST
 from swarmscope.sim.cells import index_robots
 from swarmscope.sim.radio import exchange
 from swarmscope.sim.sensing import sense
@@ -20,12 +21,18 @@ def line(robots=2, gap=1.0, **radio):
     return sim
 
 
+def content(i, k, length):
+    """The bytes of packet k of robot i: short ones begin like requests, others like features."""
+    kind = KIND_REQUEST if length == REQUEST else KIND_FEATURES
+    return [0x10 | kind, *((10 * i + k + np.arange(1, length)) % 256).tolist()]
+
+
 def post(sim, i, *packets):
     """Fill robot i's outbox with packets (to, length)."""
     sim.decisions["n_out"][i] = len(packets)
     for k, (to, length) in enumerate(packets):
         sim.decisions["out_to"][i, k], sim.decisions["out_length"][i, k] = to, length
-        sim.decisions["out"][i, k, :length] = 10 * i + k + np.arange(length)
+        sim.decisions["out"][i, k, :length] = content(i, k, length)
 
 
 def heard(sim, i, tick):
@@ -42,7 +49,7 @@ def test_a_packet_arrives_whole_at_its_receiver_and_nobody_else():
     sim = line(3)
     post(sim, 0, (2, FEATURES))
     exchange(sim, 0)
-    assert heard(sim, 2, 1) == [list(range(FEATURES))]
+    assert heard(sim, 2, 1) == [content(0, 0, FEATURES)]
     assert heard(sim, 1, 1) == []
     assert heard(sim, 0, 1) == []
 
@@ -64,6 +71,16 @@ def test_bytes_on_the_air_are_counted_apart_from_the_payload():
     assert counters(sim, 0, "sent_features", "feature_bytes") == [1, FEATURES]
     assert sim.links[: sim.links_n[0]].tolist() == [[0, 0, 2, FEATURES]]
     assert counters(sim, 1, "sent", "bytes", "air_bytes") == [0, 0, 0]
+
+
+@pytest.mark.parametrize(("kind", "length", "features"), [(KIND_DIRECTED_REQUEST, 8, 0), (KIND_LATENT, 138, 1)])
+def test_features_are_told_by_the_kind_of_packet(kind, length, features):
+    sim = line(2)
+    post(sim, 0, (1, length))
+    sim.decisions["out"][0, 0, 0] = 0x10 | kind
+    exchange(sim, 0)
+    assert counters(sim, 0, "bytes", "sent_features", "feature_bytes") == [length, features, features * length]
+    assert sim.links_n[0] == features
 
 
 def test_beyond_the_range_nothing_arrives():

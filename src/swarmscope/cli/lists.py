@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import inspect
+import sys
 from types import ModuleType
 
 from rich.table import Table
@@ -44,8 +45,9 @@ def _short(value: Option) -> str:
 
 
 def field_docs(module: ModuleType, class_name: str) -> dict[str, str]:
-    """Return the text that follows each field of a class in its module's source."""
-    for node in ast.parse(inspect.getsource(module)).body:
+    """Return the text that follows each field of a class in the source of the module that defines it."""
+    source = sys.modules[getattr(module, class_name).__module__] if hasattr(module, class_name) else module
+    for node in ast.parse(inspect.getsource(source)).body:
         if isinstance(node, ast.ClassDef) and node.name == class_name:
             return _texts_after_fields(node)
     return {}

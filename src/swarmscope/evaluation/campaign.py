@@ -11,11 +11,10 @@ from typing import NamedTuple
 
 from swarmscope.evaluation.engines import Engine
 from swarmscope.evaluation.experiment import Experiment, Unit, units
-from swarmscope.evaluation.scenario import complete
+from swarmscope.evaluation.scenario import Scenario, complete, planner_of
 from swarmscope.evaluation.store import Store
 from swarmscope.evaluation.warm_up import warm_up_jobs
 from swarmscope.evaluation.work import finished, make_job, unit_key, world_key
-from swarmscope.onboard.planning._contract import load_planner
 
 Keyed = tuple[Unit, str]
 Progress = Callable[[int, int, int], None]
@@ -68,9 +67,8 @@ def run_missing(
     todo = {key: unit for unit, key in wanted}  # two labels may name the same run
     if not todo:
         return state
-    planners = {unit.scenario.planner.name for unit in todo.values()}
-    _check_available(planners)
-    _warm_up(planners, engine, say)
+    _check_available([unit.scenario for unit in todo.values()])
+    _warm_up({unit.scenario.planner.name for unit in todo.values()}, engine, say)
     order = list(todo)
     random.Random(os.getpid()).shuffle(order)  # noqa: S311  not the results' order: they do not depend on it
     skipped: list[str] = []
@@ -96,10 +94,11 @@ def _jobs(order: list[str], todo: dict[str, Unit], store: Store, skipped: list[s
         yield make_job(key, world, complete(scenario), store.references(world))
 
 
-def _check_available(planners: set[str]) -> None:
-    """Raise a MissingExtraError before anything is run if some planner lacks its library here."""
-    for name in sorted(planners):
-        check = getattr(load_planner(name), "check_available", None)
+def _check_available(scenarios: list[Scenario]) -> None:
+    """Raise an error before anything is run if some planner lacks its library or its network here."""
+    chosen = {(s.planner.name, s.planner.model or ""): s.planner for s in scenarios}
+    for key in sorted(chosen):
+        check = getattr(planner_of(chosen[key]), "check_available", None)
         if check is not None:
             check()
 

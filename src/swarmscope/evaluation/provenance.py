@@ -19,8 +19,8 @@ def versions() -> dict[str, str]:
     return {
         "swarmscope": swarmscope.__version__,
         "python": platform.python_version(),
-        "numpy": _installed_version("numpy"),
-        "numba": _installed_version("numba"),
+        "numpy": installed_version("numpy"),
+        "numba": installed_version("numba"),
     }
 
 
@@ -39,7 +39,8 @@ def git_revision(package: Path = PACKAGE) -> str:
     return f"{revision}-dirty" if changes else revision
 
 
-def _installed_version(package: str) -> str:
+def installed_version(package: str) -> str:
+    """Return the version of a package, 'unknown' when it is not installed."""
     try:
         return importlib.metadata.version(package)
     except importlib.metadata.PackageNotFoundError:

@@ -162,6 +162,7 @@ def figures(outcome: Outcome) -> dict[str, Any]:
             "robots": scenario.robots,
             "seed": scenario.seed,
         },
+        **_model(outcome.setting.planner),
         "config_sha256": hashlib.sha256(json.dumps(complete(scenario), sort_keys=True).encode()).hexdigest(),
         "versions": versions(),
         "git_revision": git_revision(),
@@ -174,6 +175,12 @@ def figures(outcome: Outcome) -> dict[str, Any]:
         },
     }
     return values
+
+
+def _model(planner: Any) -> dict[str, str]:
+    """Return which network the planner runs, nothing without one."""
+    state = getattr(planner, "model_state", None)
+    return {} if state is None else {"model_sha256": state()}
 
 
 def place_name(scenario: Scenario) -> str:

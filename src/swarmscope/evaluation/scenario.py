@@ -119,6 +119,8 @@ class PlannerModel(_Strict):
     """A planner by name, with its parameters."""
 
     name: str = "nav-scope"
+    model: str | None = None
+    """Folder of the network that it runs instead of its own; only for planners with a network."""
     params: dict[str, Annotated[float, Field(allow_inf_nan=False)]] = {}
 
 
@@ -160,11 +162,13 @@ def parse_scenario(values: Any, where: str) -> Scenario:
         raise UnknownNameError("task", scenario.task.name, task_names(), f"{where}: task.name")
     if scenario.planner.name not in planner_names():
         raise UnknownNameError("planner", scenario.planner.name, planner_names(), f"{where}: planner.name")
+    if scenario.planner.model is not None and not hasattr(load_planner(scenario.planner.name), "with_model"):
+        raise ConfigError(f"{where}: planner.model", f"planner '{scenario.planner.name}' runs no network")
     return scenario
 
 
 def read_scenario_file(path: Path) -> dict[str, Any]:
-    """Return the mapping in YAML file ``path``, not validated yet; a map file is looked for beside it."""
+    """Return the mapping in YAML file ``path``, not validated yet; a map file and a model are looked for beside it."""
     try:
         values = yaml.safe_load(path.read_text(encoding="utf-8"))
     except UnicodeDecodeError:
@@ -178,6 +182,9 @@ def read_scenario_file(path: Path) -> dict[str, Any]:
     place = values.get("map")
     if isinstance(place, dict) and isinstance(place.get("file"), str):
         place["file"] = _find_map(path, place["file"])
+    planner = values.get("planner")
+    if isinstance(planner, dict) and isinstance(planner.get("model"), str):
+        planner["model"] = _find_beside(path, planner["model"])
     return values
 
 
@@ -185,6 +192,11 @@ def _find_map(scenario: Path, name: str) -> str:
     """Return the map's path: beside the scenario or as it is; names of packaged maps stay names."""
     if _is_packaged(name):
         return name
+    return _find_beside(scenario, name)
+
+
+def _find_beside(scenario: Path, name: str) -> str:
+    """Return the path beside the scenario if there is something, else as it is."""
     beside = scenario.parent / name
     return str(beside) if beside.exists() else name
 
@@ -245,6 +257,8 @@ def complete(scenario: Scenario) -> dict[str, Any]:
     values["planner"]["params"] = make_params(planner, scenario.planner.params)._asdict()
     if scenario.task is not None:
         values["task"]["options"] = task_options(load_task(scenario.task.name)) | scenario.task.options
+    if scenario.planner.model is not None:
+        values["planner"]["model"] = str(Path(scenario.planner.model).resolve())
     if scenario.map is not None and not _is_packaged(scenario.map.file):
         values["map"]["file"] = str(Path(scenario.map.file).resolve())
     return values
@@ -310,9 +324,15 @@ def make_rig_of(scenario: Scenario) -> Rig:
     )
 
 
+def planner_of(chosen: PlannerModel) -> Any:
+    """Return the planner's module, or the planner with the model that is named instead of its own."""
+    planner = load_planner(chosen.name)
+    return planner if chosen.model is None else planner.with_model(chosen.model)
+
+
 def make_setting(scenario: Scenario, setup: Setup, threads: int = 1) -> Setting:
     """Return the run of ``scenario`` in ``setup``, ready for the kernels."""
-    planner = load_planner(scenario.planner.name)
+    planner = planner_of(scenario.planner)
     noise, radio = scenario.noise, scenario.radio
     ticks = scenario.limit_s * scenario.lidar.rate_hz
     heavy = ticks * scenario.robots * scenario.lidar.beams > 4e7

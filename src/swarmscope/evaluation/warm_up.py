@@ -15,7 +15,9 @@ def kernels_are_cold(planner: str) -> bool:
     """Tell whether the compiled kernels of the simulator or of the planner are not on disk yet."""
     from swarmscope.sim import loop
 
-    return _is_cold(loop.world_phase) or _is_cold(load_planner(planner).step_all)
+    module = load_planner(planner)
+    kernels = getattr(module, "KERNELS", (module.step_all,))
+    return _is_cold(loop.world_phase) or any(map(_is_cold, kernels))
 
 
 def warm_up_jobs(planners: Iterable[str]) -> list[str]:

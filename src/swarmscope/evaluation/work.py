@@ -17,9 +17,9 @@ import numpy as np
 
 from swarmscope.errors import SwarmscopeError
 from swarmscope.evaluation.cases import find_cases
-from swarmscope.evaluation.provenance import PACKAGE, git_revision, versions
+from swarmscope.evaluation.provenance import PACKAGE, git_revision, installed_version, versions
 from swarmscope.evaluation.runner import Outcome, References, figures, play
-from swarmscope.evaluation.scenario import Scenario, parse_scenario
+from swarmscope.evaluation.scenario import PlannerModel, Scenario, parse_scenario, planner_of
 
 MEASURED = ("plan_us_p50", "plan_us_p99", "run_wall_s", "reference_s")
 """Figures that are times of this machine: stored, but no part of the digest."""
@@ -65,9 +65,17 @@ def revision() -> str:
     return git_revision()
 
 
+def model_state(config: dict[str, Any]) -> str | None:
+    """Return which network the scenario's planner runs, and by which version of what; None without one."""
+    planner = planner_of(PlannerModel.model_validate(config.get("planner", {})))
+    state = getattr(planner, "model_state", None)
+    return None if state is None else f"{state()} onnxruntime {installed_version('onnxruntime')}"
+
+
 def unit_key(config: dict[str, Any]) -> str:
     """Return the content key of a complete scenario."""
-    return _hash({"config": config, "code": code_state()})
+    model = model_state(config)
+    return _hash({"config": config, "code": code_state()} | ({} if model is None else {"model": model}))
 
 
 def world_key(scenario: Scenario) -> str:
@@ -79,6 +87,7 @@ def world_key(scenario: Scenario) -> str:
 def make_job(key: str, world: str, config: dict[str, Any], references: dict[str, Any] | None) -> str:
     """Return a unit as text; ``references`` as an earlier run in the same world returned them."""
     job = {"key": key, "world": world, "config": config, "references": references, "code": code_state()}
+    job["model"] = model_state(config)
     return json.dumps(job)
 
 
@@ -88,6 +97,8 @@ def work(job: str) -> str:
     try:
         if asked["code"] != code_state():
             raise SwarmscopeError("this machine has another version of swarmscope, numpy or numba than the one asking")
+        if asked.get("model") != model_state(asked["config"]):
+            raise SwarmscopeError("the planner's network is another one here than where the run was asked for")
         result = _run(asked)
     except SwarmscopeError as error:
         result = {"error": str(error)}

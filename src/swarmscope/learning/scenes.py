@@ -78,7 +78,7 @@ class Counts(dict[str, int]):
     """How many robots had which outcome."""
 
     def __init__(self) -> None:
-        super().__init__({"looked_at": 0, "clear_ahead": 0} | {name: 0 for name in OUTCOMES})
+        super().__init__({"looked_at": 0, "clear_ahead": 0} | dict.fromkeys(OUTCOMES, 0))
 
 
 @lru_cache(maxsize=1)

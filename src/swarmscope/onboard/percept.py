@@ -104,6 +104,10 @@ SHARED = np.dtype(
         ("ask_n", np.int64),
         ("ask_id", np.int64, PEERS),
         ("ask_seq", np.int64, PEERS),
+        ("ask_direction", np.int16, PEERS),  # code of the direction that is asked about, -1 = none
+        # this tick's packets with a network's features that answer our last round
+        ("latent_n", np.uint8),
+        ("latent_at", np.uint8, MAX_INBOX),  # index into ``packet``
         # counters
         ("dropped_bad", np.int64),  # torn, corrupt or foreign packets
         ("dropped_stale", np.int64),  # old, replayed or unasked-for packets

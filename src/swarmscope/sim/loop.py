@@ -9,7 +9,6 @@ from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import pairwise
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -41,7 +40,8 @@ class Setting:
     goals: np.ndarray
     beams: Beams
     rig: Rig
-    planner: ModuleType
+    planner: Any
+    """A planner's module, or what its ``with_model`` returned."""
     params: Any
     noise: Noise = field(default_factory=Noise)
     radio: Radio = field(default_factory=Radio)

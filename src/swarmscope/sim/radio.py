@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from swarmscope._jit import jit, jit_inner
-from swarmscope.onboard.sharing.message import REQUEST_BYTES
+from swarmscope.onboard.sharing.message import is_request
 from swarmscope.sim.state import LINKS, QUEUE, Sim
 from swarmscope.sim.streams import RADIO_LOSS, key, mix, uniform
 
@@ -29,7 +29,7 @@ def _send(sim: Sim, tick: int, i: int, k: int) -> None:
     j, length = decision["out_to"][k], decision["out_length"][k]
     if j < 0 or j >= sim.robots.size or length <= 0:
         return
-    features = length > REQUEST_BYTES
+    features = not is_request(decision["out"][k, 0])
     receiver = sim.robots[j]
     airtime = 8.0 * (length + radio.overhead_bytes) / radio.bitrate
     now = tick * sim.clock.dt

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+import tempfile
+from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from giwt_models import make_model
 from helpers import DT, Rows, circles_world, mirrored, place_scenario, rig_of, run_scenario, scan_at
 from swarmscope.onboard.percept import MAX_OUTBOX, PERCEPT
 from swarmscope.onboard.planning._contract import (
@@ -23,7 +27,24 @@ from swarmscope.onboard.sharing.message import OK, decode
 PLANNERS = planner_names()
 MEMORY_LIMIT = 14_900
 """Bytes of planner memory per robot."""
+LATENTS = 1_200
+"""Bytes more for planners that keep what the networks of eight neighbours say."""
+TEMPORARY = tempfile.TemporaryDirectory(prefix="swarmscope-models-")
 every_planner = pytest.mark.parametrize("name", PLANNERS)
+
+
+@cache
+def model_of(name):
+    """The folder of a network with random weights, None for planners without a network."""
+    networks = getattr(getattr(load_planner(name), "PLANNER", None), "networks", None)
+    return networks and make_model(Path(TEMPORARY.name) / name, network=min(networks))
+
+
+@cache
+def usable(name):
+    """The planner, with a network of random weights where it needs one."""
+    planner, model = load_planner(name), model_of(name)
+    return planner if model is None else planner.with_model(model)
 
 
 class Robots(Rows):
@@ -31,7 +52,7 @@ class Robots(Rows):
 
     def __init__(self, name, robots=1, rig=None):
         super().__init__(rig or rig_of(), robots)
-        self.planner = load_planner(name)
+        self.planner = usable(name)
         self.params = self.planner.Params()
         self.memories = self.planner.new_memory(robots)
         self.percepts["goal_distance"] = 5.0
@@ -145,6 +166,8 @@ def test_the_number_of_robots_in_a_call_does_not_matter(name):
 @settings(max_examples=60)
 @given(seed=st.integers(0, 2**31))
 def test_the_mirrored_scene_gets_the_mirrored_command(name, seed):
+    if model_of(name) is not None:
+        pytest.skip("a network is not its own mirror image")
     here, there = random_scene(Robots(name), seed), random_scene(Robots(name), seed, mirror=True)
     for _ in range(4):
         v, w = here.step().command()
@@ -224,8 +247,10 @@ def test_an_obstacle_ahead_is_not_driven_at(name):
 
 @every_planner
 def test_memory_per_robot_stays_small(name):
-    trace = run_scenario(place_scenario([(0.0, 0.0, 0.0)], [(1.0, 0.0)], planner={"name": name}, limit_s=1.0))
-    assert 0 < trace.memory_bytes <= MEMORY_LIMIT
+    model = model_of(name)
+    planner = {"name": name} if model is None else {"name": name, "model": str(model)}
+    trace = run_scenario(place_scenario([(0.0, 0.0, 0.0)], [(1.0, 0.0)], planner=planner, limit_s=1.0))
+    assert 0 < trace.memory_bytes <= MEMORY_LIMIT + (0 if model is None else LATENTS)
 
 
 def test_the_percept_has_no_global_pose():

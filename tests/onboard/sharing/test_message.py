@@ -22,10 +22,14 @@ from swarmscope.onboard.sharing.message import (
     BAD_LENGTH,
     BAD_VERSION,
     CRC_INIT,
+    DIRECTED_REQUEST_BYTES,
     HEADER_FIELDS,
+    KIND_DIRECTED_REQUEST,
     KIND_EXACT_FEATURES,
     KIND_FEATURES,
+    KIND_LATENT,
     KIND_REQUEST,
+    LATENT_FEATURES,
     MAX_FEATURES,
     MAX_FEATURES_BYTES,
     MAX_PACKET_BYTES,
@@ -37,12 +41,17 @@ from swarmscope.onboard.sharing.message import (
     PacketError,
     crc16,
     decode,
+    direction_of,
+    encode_directed_request,
     encode_exact_features,
     encode_features,
+    encode_latent,
     encode_request,
     extremum_kind,
+    is_request,
     quantise_features,
     read_features,
+    read_latent,
     seq_newer,
 )
 
@@ -75,6 +84,17 @@ def exact(angles, distances, n=None):
 def request(sender=5, seq=6):
     out = np.zeros(REQUEST_BYTES, np.uint8)
     return out[: encode_request(sender, seq, out)].copy()
+
+
+def directed(direction, sender=5, seq=6):
+    out = np.zeros(DIRECTED_REQUEST_BYTES, np.uint8)
+    return out[: encode_directed_request(sender, seq, direction, out)].copy()
+
+
+def latent(codes=None, scale=200, sender=5, seq=6, reply_to=7):
+    out = np.zeros(MAX_PACKET_BYTES, np.uint8)
+    codes = np.arange(LATENT_FEATURES, dtype=np.uint8) if codes is None else codes
+    return out[: encode_latent(sender, seq, reply_to, codes, scale, out)].copy()
 
 
 def status_of(data, length=None):
@@ -131,6 +151,20 @@ def test_sizes(n):
     assert a_packet(n).size == 10 + 2 * n <= MAX_FEATURES_BYTES
     assert exact(np.zeros(n), np.zeros(n)).size == 10 + 8 * n <= MAX_PACKET_BYTES
     assert request().size == REQUEST_BYTES == 7
+
+
+def test_directed_request_worked_by_hand():
+    packet = directed(math.pi / 2.0, sender=0x0005, seq=0xABCD)
+    assert packet.tobytes()[:-2].hex(" ") == "14 05 00 cd ab 40"
+    assert packet.tobytes() == sealed(packet.tobytes()[:-2]).tobytes()
+    assert packet.size == DIRECTED_REQUEST_BYTES == 8
+
+
+def test_latent_packet_worked_by_hand():
+    packet = latent(scale=0xC8, sender=0x0102, seq=0x0304, reply_to=0x0506)
+    head = bytes.fromhex("15 02 01 04 03 06 05 c8")
+    assert packet.tobytes() == sealed(head + bytes(range(128))).tobytes()
+    assert packet.size == MAX_PACKET_BYTES == 138
 
 
 def test_crc_check_value():
@@ -197,6 +231,34 @@ def test_exact_round_trip(pairs):
     assert sorted(got_distances.tolist()) == sent
     for angle in pairs[0]:
         assert np.min(np.abs((got_angles - angle + math.pi) % TURN - math.pi)) <= 1e-5
+
+
+@for_any(st.floats(-20.0, 20.0), st.integers(0, 0xFFFF), st.integers(0, 0xFFFF))
+def test_directed_round_trip(direction, sender, seq):
+    packet = directed(direction, sender, seq)
+    status, header = status_of(packet)
+    assert (status, header[:4]) == (OK, [KIND_DIRECTED_REQUEST, sender, seq, -1])
+    assert abs((direction_of(header[4]) - direction + math.pi) % TURN - math.pi) <= math.pi / 256.0 + EPS
+
+
+@pytest.mark.parametrize("direction", [math.nan, math.inf, -math.inf, 1e300])
+def test_a_direction_that_is_no_number_is_sent_as_0(direction):
+    assert status_of(directed(direction)) == (OK, [KIND_DIRECTED_REQUEST, 5, 6, -1, 0])
+
+
+@for_any(st.binary(min_size=128, max_size=128), st.integers(-5, 300), st.integers(0, 0xFFFF))
+def test_latent_round_trip(codes, scale, reply_to):
+    row = np.frombuffer(codes, np.uint8)
+    packet = latent(row, scale, reply_to=reply_to)
+    assert status_of(packet) == (OK, [KIND_LATENT, 5, 6, reply_to, scale & 0xFF])
+    got = np.zeros(LATENT_FEATURES, np.uint8)
+    assert read_latent(packet, packet.size, got) == scale & 0xFF
+    assert got.tobytes() == codes
+
+
+def test_only_requests_are_requests():
+    packets = [request(), directed(1.0), a_packet(3), exact(np.ones(2), np.ones(2)), latent()]
+    assert [bool(is_request(packet[0])) for packet in packets] == [True, True, False, False, False]
 
 
 def test_ends_of_the_scales():
@@ -267,6 +329,9 @@ def test_no_room_gives_no_packet():
     assert encode_features(1, 2, 3, two, two, 2, RANGE, np.zeros(13, np.uint8)) == 0
     assert encode_exact_features(1, 2, 3, two, two, 2, np.zeros(25, np.uint8)) == 0
     assert encode_request(1, 2, np.zeros(6, np.uint8)) == 0
+    assert encode_directed_request(1, 2, 0.0, np.zeros(7, np.uint8)) == 0
+    assert encode_latent(1, 2, 3, np.zeros(128, np.uint8), 4, np.zeros(137, np.uint8)) == 0
+    assert encode_latent(1, 2, 3, np.zeros(127, np.uint8), 4, np.zeros(138, np.uint8)) == 0
 
 
 def test_reading_into_short_arrays_stays_inside():
@@ -274,7 +339,13 @@ def test_reading_into_short_arrays_stays_inside():
     packet = a_packet(8)
     assert read_features(packet, packet.size, RANGE, angles[:3], distances[:3]) == 3
     assert angles[3] == distances[3] == -1.0
-    assert read_features(request(), 7, RANGE, angles, distances) == 0
+    for packet in (request(), directed(0.0), latent()):
+        assert read_features(packet, packet.size, RANGE, angles, distances) == 0
+    codes = np.full(LATENT_FEATURES, 9, np.uint8)
+    for packet in (request(), directed(0.0), a_packet(16), exact(np.ones(16), np.ones(16))):
+        assert read_latent(packet, packet.size, codes) == -1
+    assert read_latent(latent(), 138, codes[:127]) == -1
+    assert (codes == 9).all()
 
 
 @for_any(st.binary(max_size=160), st.integers(-5, 200))
@@ -283,6 +354,7 @@ def test_reading_what_was_never_decoded_stays_inside(data, length):
     row = np.frombuffer(data, np.uint8)
     assert 0 <= read_features(row, length, RANGE, angles, distances) <= MAX_FEATURES
     assert 0 <= crc16(row, length, -1) <= 0xFFFF
+    assert -1 <= read_latent(row, length, np.zeros(LATENT_FEATURES, np.uint8)) <= 255
 
 
 @for_any(st.integers(-(10**6), 10**6), st.integers(-(10**6), 10**6))
@@ -320,7 +392,9 @@ def test_a_later_number_is_newer_across_the_wrap(seq, later):
 
 
 @pytest.mark.parametrize(
-    "packet", [a_packet(8), a_packet(0), request()], ids=["features", "empty", "request"]
+    "packet",
+    [a_packet(8), a_packet(0), request(), directed(2.0)],
+    ids=["features", "empty", "request", "directed"],
 )
 @pytest.mark.parametrize("flips", [1, 2])
 def test_every_one_and_two_bit_error_is_found(packet, flips):
@@ -331,6 +405,17 @@ def test_every_one_and_two_bit_error_is_found(packet, flips):
             torn[bit // 8] ^= 1 << (bit % 8)
         assert decode(torn, torn.size, header) != OK
         assert header.tolist() == [-1] * 5
+
+
+def test_every_one_bit_error_of_a_latent_is_found_and_some_of_two():
+    packet, header = latent(), np.zeros(5, np.int64)
+    generator = np.random.default_rng(5)
+    pairs = [(b, b) for b in range(8 * packet.size)] + generator.integers(0, 8 * packet.size, (20_000, 2)).tolist()
+    for bits in pairs:
+        torn = packet.copy()
+        for bit in set(bits):
+            torn[bit // 8] ^= 1 << (bit % 8)
+        assert decode(torn, torn.size, header) != OK
 
 
 def test_every_burst_of_16_bits_is_found():
@@ -366,7 +451,9 @@ def check_is_harmless(data):
     assert np.all((angles >= 0.0) & (angles < TURN) & (distances >= 0.0) & (distances <= RANGE))
 
 
-@pytest.mark.parametrize("packet", [a_packet(16), request(), exact(np.ones(9), np.ones(9))])
+@pytest.mark.parametrize(
+    "packet", [a_packet(16), request(), exact(np.ones(9), np.ones(9)), directed(1.0), latent()]
+)
 def test_every_truncation_and_every_longer_length_is_found(packet):
     longer = np.concatenate([packet, np.zeros(40, np.uint8)])
     for length in range(longer.size):
@@ -410,7 +497,14 @@ def test_a_standard_checksum_never_passes(pairs):
         ("02 0100 0200 0300 00", BAD_VERSION),
         ("22 0100 0200 0300 00", BAD_VERSION),
         ("10 0100 0200", BAD_KIND),
-        ("14 0100 0200 0300 00", BAD_KIND),
+        ("16 0100 0200 0300 00", BAD_KIND),
+        ("14 0100 0200", BAD_LENGTH),
+        ("14 0100 0200 40 00", BAD_LENGTH),
+        ("15 0100 0200 03", TOO_SHORT),
+        ("15 0100 0200 0300 c8" + " 00" * 127, BAD_LENGTH),
+        ("15 0100 0200 0300 c8" + " 00" * 129, BAD_LENGTH),
+        ("14 0100 0200 40", OK),
+        ("15 0100 0200 0300 ff" + " 00" * 128, OK),
         ("1f 0100 0200 0300 00", BAD_KIND),
         ("12 0100 0200", TOO_SHORT),
         ("11 0100 0200 03", BAD_LENGTH),

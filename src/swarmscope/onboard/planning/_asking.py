@@ -21,18 +21,25 @@ def request_ahead(
     now = percept["now_s"]
     if now - shared["asked_s"] < every_s:
         return
-    sensor = rig.sensor
     horizon = max(rig.protection.l_th, rig.look_ahead) + ahead_s * rig.body.v_max
+    if obstacle_ahead(masked, percept, rig, horizon):
+        ask_neighbours(percept, shared, decision, rig)
+
+
+@jit
+def obstacle_ahead(masked: np.ndarray, percept: Row, rig: Rig, horizon: float) -> bool:
+    """Tell whether on the way to a goal beyond ``horizon`` [m] something stands nearer than that."""
     if percept["goal_distance"] <= horizon:
-        return
+        return False
+    sensor = rig.sensor
     centre = beam_of(percept["goal_bearing"], sensor.angle_min, sensor.increment, sensor.beams, sensor.wraps)
     for k in range(-rig.half, rig.half + 1):
         n = (centre + k) % sensor.beams if sensor.wraps else centre + k
         if 0 <= n < sensor.beams and masked[n] < horizon and masked[n] * abs(
             math.sin(k * sensor.increment)
         ) < rig.footprint:
-            ask_neighbours(percept, shared, decision, rig)
-            return
+            return True
+    return False
 
 
 @jit

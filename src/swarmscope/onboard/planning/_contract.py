@@ -76,7 +76,7 @@ def load_planner(name: str) -> ModuleType:
     raise UnknownNameError("planner", name, planner_names())
 
 
-def make_params(planner: ModuleType, values: dict[str, Any]) -> Any:
+def make_params(planner: Any, values: dict[str, Any]) -> Any:
     """Return the planner's ``Params`` with ``values`` set, each converted to the declared type."""
     fields = planner.Params._field_defaults
     for key in values:

@@ -11,12 +11,16 @@ import numpy as np
 from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.onboard.percept import MAX_OUTBOX, PEERS, Rig, Row
 from swarmscope.onboard.sharing.message import (
-    KIND_REQUEST,
+    KIND_DIRECTED_REQUEST,
+    KIND_LATENT,
     OK,
     decode,
+    encode_directed_request,
     encode_exact_features,
     encode_features,
+    encode_latent,
     encode_request,
+    is_request,
     read_features,
     seq_newer,
 )
@@ -26,12 +30,13 @@ from swarmscope.onboard.sharing.message import (
 def read_inbox(
     percept: Row, shared: Row, rig: Rig, header: np.ndarray, angles: np.ndarray, distances: np.ndarray
 ) -> None:
-    """Take in this tick's packets: remember features heard and who asks for ours.
+    """Take in this tick's packets: remember features heard, who asks for ours, and which packets are LATENT answers.
 
-    ``header (5,) int64``, ``angles``, ``distances`` are scratch.
+    The last are left to the planner that asked for them. ``header (5,) int64``, ``angles``, ``distances`` are scratch.
     """
     now = percept["now_s"]
     shared["ask_n"] = 0
+    shared["latent_n"] = 0
     for p in range(PEERS):
         if shared["heard_id"][p] >= 0 and now - shared["heard_s"][p] > rig.max_feature_age:
             shared["heard_id"][p] = -1
@@ -44,14 +49,20 @@ def read_inbox(
         if header[1] == percept["id"] or not _is_new(shared, header[1], header[2]):
             shared["dropped_stale"] += 1
             continue
-        if header[0] == KIND_REQUEST:
+        if is_request(header[0]):
             if shared["ask_n"] < PEERS:
+                directed = header[0] == KIND_DIRECTED_REQUEST
+                shared["ask_direction"][shared["ask_n"]] = header[4] if directed else -1
                 shared["ask_id"][shared["ask_n"]] = header[1]
                 shared["ask_seq"][shared["ask_n"]] = header[2]
                 shared["ask_n"] += 1
             continue
         if header[3] != shared["asked_seq"] or now - shared["asked_s"] > rig.max_feature_age:
             shared["dropped_stale"] += 1
+            continue
+        if header[0] == KIND_LATENT:
+            shared["latent_at"][shared["latent_n"]] = k
+            shared["latent_n"] += 1
             continue
         count = read_features(data, length, rig.sensor.range_max, angles, distances)
         _remember(shared, header[1], count, angles, distances)
@@ -120,6 +131,36 @@ def ask(percept: Row, shared: Row, decision: Row, peer: int) -> None:
     decision["out_length"][k] = encode_request(percept["id"], shared["asked_seq"], decision["out"][k])
     decision["n_out"] = k + 1
     shared["asked_n"] += 1
+
+
+@jit
+def ask_direction(percept: Row, shared: Row, decision: Row, peer: int, direction: float) -> None:
+    """Ask ``peer`` what it sees in ``direction`` [rad, compass frame] (left out when the outbox is full)."""
+    k = decision["n_out"]
+    if k >= MAX_OUTBOX:
+        return
+    decision["out_to"][k] = peer
+    decision["out_length"][k] = encode_directed_request(
+        percept["id"], shared["asked_seq"], direction, decision["out"][k]
+    )
+    decision["n_out"] = k + 1
+    shared["asked_n"] += 1
+
+
+@jit
+def answer_directed(
+    percept: Row, shared: Row, decision: Row, q: int, codes: np.ndarray, scale_code: int
+) -> None:
+    """Answer the ``q``-th of those who ask with a network's features ``codes (128,)`` uint8."""
+    k = decision["n_out"]
+    if k >= MAX_OUTBOX:
+        return
+    shared["seq"] = (shared["seq"] + 1) & 0xFFFF
+    decision["out_to"][k] = shared["ask_id"][q]
+    decision["out_length"][k] = encode_latent(
+        percept["id"], shared["seq"], shared["ask_seq"][q], codes, scale_code, decision["out"][k]
+    )
+    decision["n_out"] = k + 1
 
 
 @jit

@@ -1,7 +1,8 @@
 """Features to bytes and back: the packets that robots exchange, version 1 (see ``docs/message.md``).
 
 A robot asks (REQUEST) and its neighbour answers with the extrema of its scan (FEATURES): directions in the
-compass frame (0 = east, counter-clockwise), distances in [0, range_max]. The kernels never raise and never
+compass frame (0 = east, counter-clockwise), distances in [0, range_max]. Or it asks for a network's view of a
+direction (DIRECTED_REQUEST) and is sent that network's features (LATENT). The kernels never raise and never
 allocate: what cannot be decoded gives a status other than ``OK``, what cannot be encoded gives length 0.
 """
 
@@ -21,13 +22,20 @@ KIND_REQUEST = 1
 KIND_FEATURES = 2
 KIND_EXACT_FEATURES = 3
 """Features as float32, to measure what quantisation costs; no robot needs it."""
+KIND_DIRECTED_REQUEST = 4
+"""A request that says in which direction the asker wants to go."""
+KIND_LATENT = 5
+"""A network's features of what the sender sees in that direction, a byte each."""
 
 MAX_FEATURES = 16
 REQUEST_BYTES = 7
+DIRECTED_REQUEST_BYTES = 8
 MAX_FEATURES_BYTES = 42
 """The longest packet that robots send in earnest: ``10 + 2 * MAX_FEATURES``."""
 MAX_PACKET_BYTES = 138
-"""Room that any packet fits into: an exact one has ``10 + 8 * MAX_FEATURES`` bytes."""
+"""Room that any packet fits into: an exact one has ``10 + 8 * MAX_FEATURES`` bytes, a latent one always that many."""
+LATENT_FEATURES = 128
+"""Features in a LATENT packet, always all of them."""
 
 OK = 0
 TOO_SHORT = 1
@@ -38,7 +46,9 @@ BAD_CHECKSUM = 5
 STATUS_NAMES = ("ok", "too short", "bad version", "bad kind", "bad length", "bad checksum")
 
 HEADER_FIELDS = ("kind", "sender", "seq", "reply_to", "n")
-"""What ``decode`` fills in, in this order; -1 where the packet has no such field."""
+"""What ``decode`` fills in, in this order; -1 where the packet has no such field.
+
+``n`` is the number of features; of a DIRECTED_REQUEST the code of its direction, of a LATENT that of its scale."""
 
 CRC_INIT = 0xFFFF ^ 0x5357
 """Initial value of the checksum: the standard one mixed with 'SW', so that other protocols' packets fail."""
@@ -196,6 +206,59 @@ def encode_request(sender: int, seq: int, out: np.ndarray) -> int:
 
 
 @jit
+def encode_directed_request(sender: int, seq: int, direction: float, out: np.ndarray) -> int:
+    """Write a DIRECTED_REQUEST into ``out`` uint8; return its length (0 when ``out`` is too small).
+
+    ``direction`` [rad, compass frame] travels as the nearest of 256; NaN and infinity as 0.
+    """
+    if out.size < DIRECTED_REQUEST_BYTES:
+        return 0
+    _put_head(out, KIND_DIRECTED_REQUEST, sender, seq)
+    out[5] = _angle_code(direction)
+    return _put_checksum(out, DIRECTED_REQUEST_BYTES - 2)
+
+
+@jit
+def direction_of(code: int) -> float:
+    """Return the direction [rad, compass frame, 0 to 2 pi] that a DIRECTED_REQUEST's ``n`` stands for."""
+    return _angle_of(code)
+
+
+@jit
+def encode_latent(
+    sender: int, seq: int, reply_to: int, codes: np.ndarray, scale_code: int, out: np.ndarray
+) -> int:
+    """Write LATENT into ``out`` uint8; return its length (0 when ``out`` or ``codes`` uint8 is too small).
+
+    ``codes`` are signed steps of a scale whose own code is ``scale_code`` (0..255); what both mean is the sender's and
+    the receiver's business.
+    """
+    if out.size < MAX_PACKET_BYTES or codes.size < LATENT_FEATURES:
+        return 0
+    _put_head(out, KIND_LATENT, sender, seq)
+    _put_u16(out, 5, reply_to)
+    out[7] = scale_code & 0xFF
+    for k in range(LATENT_FEATURES):
+        out[_HEAD + k] = codes[k]
+    return _put_checksum(out, _HEAD + LATENT_FEATURES)
+
+
+@jit
+def read_latent(data: np.ndarray, length: int, codes: np.ndarray) -> int:
+    """Write the codes of a LATENT that ``decode`` found ``OK`` into ``codes (128,)``; return their scale's code.
+
+    -1 for anything else.
+    """
+    if length != MAX_PACKET_BYTES or length > data.size or codes.size < LATENT_FEATURES:
+        return -1
+    if int(data[0]) & 0xF != KIND_LATENT:
+        return -1
+    for k in range(LATENT_FEATURES):
+        codes[k] = data[_HEAD + k]
+    return int(data[7])
+
+
+@jit
 def encode_features(
     sender: int,
     seq: int,
@@ -246,10 +309,27 @@ def encode_exact_features(
 
 
 @jit_inline
+def is_request(first: int) -> bool:
+    """Tell by its first byte whether a packet asks; all others bring features."""
+    kind = first & 0xF
+    return kind in (KIND_REQUEST, KIND_DIRECTED_REQUEST)
+
+
+@jit_inline
+def _is_list(kind: int) -> bool:
+    """Tell whether a packet holds a list of ``n`` features."""
+    return kind in (KIND_FEATURES, KIND_EXACT_FEATURES)
+
+
+@jit_inline
 def _packet_bytes(kind: int, n: int) -> int:
-    """Return how long a packet of ``kind`` with ``n`` features is."""
+    """Return how long a packet of ``kind`` with a list of ``n`` features is."""
     if kind == KIND_REQUEST:
         return REQUEST_BYTES
+    if kind == KIND_DIRECTED_REQUEST:
+        return DIRECTED_REQUEST_BYTES
+    if kind == KIND_LATENT:
+        return MAX_PACKET_BYTES
     return _HEAD + 2 + (2 if kind == KIND_FEATURES else 8) * n
 
 
@@ -262,11 +342,11 @@ def _check(data: np.ndarray, length: int) -> int:
     if first >> 4 != VERSION:
         return BAD_VERSION
     kind = first & 0xF
-    if kind < KIND_REQUEST or kind > KIND_EXACT_FEATURES:
+    if kind < KIND_REQUEST or kind > KIND_LATENT:
         return BAD_KIND
-    if kind != KIND_REQUEST and length < _HEAD + 2:
+    if not is_request(first) and length < _HEAD + 2:
         return TOO_SHORT
-    n = int(data[7]) if kind != KIND_REQUEST else 0
+    n = int(data[7]) if _is_list(kind) else 0
     if n > MAX_FEATURES or length != _packet_bytes(kind, n):
         return BAD_LENGTH
     return OK if crc16(data, length - 2, CRC_INIT) == _get_u16(data, length - 2) else BAD_CHECKSUM
@@ -285,7 +365,9 @@ def decode(data: np.ndarray, length: int, header: np.ndarray) -> int:
         header[0] = int(data[0]) & 0xF
         header[1] = _get_u16(data, 1)
         header[2] = _get_u16(data, 3)
-        if header[0] != KIND_REQUEST:
+        if header[0] == KIND_DIRECTED_REQUEST:
+            header[4] = int(data[5])
+        elif header[0] != KIND_REQUEST:
             header[3] = _get_u16(data, 5)
             header[4] = int(data[7])
     return status
@@ -297,11 +379,13 @@ def read_features(
 ) -> int:
     """Write the features of a packet that ``decode`` found ``OK`` into the arrays; return how many.
 
-    Angles [rad, compass frame] are ascending in [0, 2 pi), distances [m] in [0, range_max]. 0 for a request.
+    Angles [rad, compass frame] are ascending in [0, 2 pi), distances [m] in [0, range_max]. 0 for other packets.
     """
     if length < _HEAD + 2 or length > data.size:
         return 0
     kind = int(data[0]) & 0xF
+    if not _is_list(kind):
+        return 0
     sent = int(data[7])
     if length != _packet_bytes(kind, sent):
         return 0
@@ -375,8 +459,8 @@ class FeatureMessage:
         if status != OK:
             raise PacketError(f"{STATUS_NAMES[status]} ({len(packet)} bytes)")
         kind, sender, seq, reply_to, n = header.tolist()
-        if kind == KIND_REQUEST:
-            raise PacketError("is a request, not features")
+        if not _is_list(kind):
+            raise PacketError("is a request, not features" if is_request(kind) else "holds a network's features")
         angles, distances = np.zeros(n), np.zeros(n)
         read_features(data, data.size, float(range_max), angles, distances)
         return cls(sender, seq, reply_to, tuple(angles.tolist()), tuple(distances.tolist()))
