@@ -133,7 +133,7 @@ def test_a_map_beside_the_scenario_is_found_and_its_run_can_be_repeated(tmp_path
 
 
 WRONG = {
-    "task": (["--task", "T9"], ["task.name", "unknown task 'T9'", "valid: T1"]),
+    "task": (["--task", "T9"], ["task.name", "unknown task 'T9'", "valid: "]),
     "planner": (["--planner", "nav-scop"], ["planner.name", "did you mean 'nav-scope'"]),
     "parameter": (["--set", "planner.params.w_ii=1"], ["parameter 'w_ii'", "did you mean 'w_i'"]),
     "infinite parameter": (["--set", "planner.params.w_i=.inf"], ["planner.params.w_i", "finite"]),

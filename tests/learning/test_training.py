@@ -67,7 +67,10 @@ def test_a_loss_that_is_not_finite_stops_and_keeps_what_was_there(data, tmp_path
     short = {"samples_per_epoch": 100, "validation_samples": 50}
     train.train(config(epochs=1, **short), data, tmp_path)
     kept = (tmp_path / "last.safetensors").read_bytes()
-    monkeypatch.setattr(train, "forward", lambda model, batch, device: model.mapper[1].bias[0] * torch.full((len(batch.right), 2), torch.nan))
+    def spoilt(model, batch, device):
+        return model.mapper[1].bias[0] * torch.full((len(batch.right), 2), torch.nan)
+
+    monkeypatch.setattr(train, "forward", spoilt)
     with pytest.raises(SwarmscopeError, match="loss is nan in epoch 2, batch 1"):
         train.train(config(epochs=2, **short), data, tmp_path)
     assert (tmp_path / "last.safetensors").read_bytes() == kept

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +17,6 @@ from rich.table import Table
 from swarmscope.cli._console import PlainConsole
 from swarmscope.errors import ConfigError, MissingExtraError
 from swarmscope.learning.generate import DRIVEN, PLACED, generate, totals, verify
-
-ALL = ("placed", "driven", "all")
 
 
 def data_command(folder: Path, sets: Sequence[str], samples: int, workers: int | None, check: bool) -> None:
@@ -36,7 +34,9 @@ def data_command(folder: Path, sets: Sequence[str], samples: int, workers: int |
 
             manifest = generate(folder, expand(sets), samples, workers, report)
     table = Table(title=f"expert data in {folder}")
-    columns = ("samples", "train", "validation", "test", "left", "maps", "looked_at", "unreachable", "nothing_ahead", "tie")
+    columns = (
+        "samples", "train", "validation", "test", "left", "maps", "looked_at", "unreachable", "nothing_ahead", "tie",
+    )  # fmt: skip
     for column in ("set", *columns, "neighbours"):
         table.add_column(column, justify="right")
     for name, row in totals(manifest).items():
@@ -54,9 +54,7 @@ def expand(sets: Sequence[str]) -> list[str]:
     return list(dict.fromkeys(found))
 
 
-def train_command(
-    config: str, data: Path, out: Path | None, init: Path | None, changes: Sequence[str]
-) -> None:
+def train_command(config: str, data: Path, out: Path | None, init: Path | None, changes: Sequence[str]) -> None:
     """Train a network, or go on training it."""
     from swarmscope.learning.config import read_config
 
@@ -148,10 +146,8 @@ def read_changes(changes: Sequence[str]) -> dict[str, Any]:
         except yaml.YAMLError:
             raise ConfigError("--set", f"'{value}' is no value") from None
         if isinstance(found[key], str):
-            try:
+            with suppress(ValueError):
                 found[key] = float(found[key])  # YAML 1.1 takes 1e-3 for text
-            except ValueError:
-                pass
     return found
 
 
@@ -169,7 +165,7 @@ def _save(out: Path, result: dict[str, Any]) -> None:
     write_atomically(out, (json.dumps(result, indent=1) + "\n").encode())
 
 
-def _words(score: dict[str, float]) -> str:
+def _words(score: Any) -> str:
     return f"{100 * score['value']:.2f} ({100 * score['low']:.1f}-{100 * score['high']:.1f})"
 
 
@@ -184,10 +180,10 @@ def _difference_table(result: dict[str, Any], labels: list[str]) -> Table:
         table.add_column(column, justify="right")
     for name, entry in result["sets"].items():
         rows = entry["networks"]
-        ahead = [
-            f"{100 * r['first_ahead']['value']:+.2f} ({100 * r['first_ahead']['low']:+.2f}..{100 * r['first_ahead']['high']:+.2f})"
-            for r in rows[1:]
-        ]
+        ahead = []
+        for row in rows[1:]:
+            value, low, high = (100 * row["first_ahead"][key] for key in ("value", "low", "high"))
+            ahead.append(f"{value:+.2f} ({low:+.2f}..{high:+.2f})")
         table.add_row(name, *ahead, *(f"{r['regret_m']['value']:.3f}" for r in rows))
     return table
 

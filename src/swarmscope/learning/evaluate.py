@@ -20,7 +20,7 @@ from swarmscope.learning.batches import batches
 from swarmscope.learning.config import TrainingConfig, parse_config
 from swarmscope.learning.models import Chooser
 from swarmscope.learning.records import SPLITS, Shard, load, select, split_of
-from swarmscope.learning.train import BEST, autocast, forward, set_up
+from swarmscope.learning.train import BEST, autocast, forward, place, set_up
 
 RESAMPLES = 2000
 Floats = NDArray[np.float64]
@@ -65,7 +65,7 @@ def open_trained(path: Path) -> Trained:
     file = path / BEST if path.is_dir() else path
     found = checkpoints.read(file)
     config = parse_config(found.about["config"], str(file))
-    label = config.network
+    label: str = config.network
     if config.network == "giwt":
         without = [w for w, used in (("beta", config.use_gain), ("positions", config.use_position)) if not used]
         label += f" without {' and '.join(without)}" if without else ""
@@ -84,7 +84,7 @@ def judge(trained: Trained, data: Shard, report: Callable[[int], None] | None = 
     config, model = trained.config, trained.model.eval()
     set_up(config.threads, config.seed)
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
-    model.to(device, memory_format=torch.channels_last)  # type: ignore[call-overload]
+    place(model, device)
     parts = []
     for batch in batches(data, 2 * config.batch, config.view_m, config.network == "cnn"):
         with autocast(config, device):

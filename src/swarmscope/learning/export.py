@@ -1,4 +1,4 @@
-"""From a checkpoint to what a robot runs: two ONNX files and ``model.json`` (onboard/planning/_giwt_network.py reads it).
+"""From a checkpoint to what a robot runs: two ONNX files and ``model.json`` (read by planning/_giwt_network.py).
 
 The encoder runs on every robot for itself, the decider on the one that decides. The graph layers of PyTorch Geometric
 are written out for a star of at most K robots, which ONNX Runtime can run; that this is the same is checked for every
@@ -12,7 +12,7 @@ import io
 import json
 import warnings
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import torch
@@ -108,7 +108,7 @@ def _about(found: Checkpoint, files: dict[str, bytes], card: dict[str, Any]) -> 
         "files": {name: hashlib.sha256(data).hexdigest() for name, data in files.items()},
         "view_m": found.about["config"]["view_m"],
         "parameters": int(sum(v.numel() for k, v in found.tensors.items() if k.startswith("model."))),
-        "training": {key: found.about[key] for key in ("config", "versions", "git", "init", "data") if key in found.about},
+        "training": {k: found.about[k] for k in ("config", "versions", "git", "init", "data") if k in found.about},
         "history": found.about.get("history", []),
     }
     return (json.dumps(about | card, indent=1) + "\n").encode()
@@ -118,12 +118,12 @@ def _to_onnx(
     module: nn.Module, example: tuple[Tensor, ...], inputs: list[str], output: str, dynamic: dict[int, str]
 ) -> bytes:
     """Return a module as the bytes of an ONNX file."""
-    axes = {name: dynamic for name in inputs} | {output: {0: "batch"}}
+    axes = dict.fromkeys(inputs, dynamic) | {output: {0: "batch"}}
     out = io.BytesIO()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the exporter talks about its own future
         torch.onnx.export(
-            module.eval(), example, out, input_names=inputs, output_names=[output], dynamic_axes=axes,
+            module.eval(), example, cast("Any", out), input_names=inputs, output_names=[output], dynamic_axes=axes,
             opset_version=OPSET, dynamo=False,
         )  # fmt: skip
     return out.getvalue()

@@ -7,7 +7,6 @@ together hold enough samples.
 from __future__ import annotations
 
 import hashlib
-import json
 import multiprocessing
 import os
 from collections.abc import Callable
@@ -27,6 +26,7 @@ from swarmscope.learning.records import (
     SCHEMA,
     SPLITS,
     VERSION,
+    content_key,
     pack,
     read_manifest,
     read_shard,
@@ -93,7 +93,8 @@ def generate(
         for one in chosen:
             _fill(folder, manifest, one, samples, pool, workers, report)
     except BrokenProcessPool:
-        raise SwarmscopeError("a worker process died (out of memory?); start again with --workers 1: nothing is lost") from None
+        why = "a worker process died (out of memory?); start again with --workers 1: nothing is lost"
+        raise SwarmscopeError(why) from None
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
     write_atomically(folder / "README.md", data_card(manifest).encode())
@@ -152,8 +153,8 @@ def make_shard(one: SetName, index: int) -> tuple[bytes, dict[str, Any]]:
     shard = pack(found)
     splits = np.bincount(split_of(shard.map), minlength=len(SPLITS)).tolist()
     about = {
-        "samples": shard.samples, "left": int((shard.side > 0).sum()), "neighbours": len(shard.node_scan) - shard.samples,
-        "scans": len(shard.codes), "first_map": seeds[0], "maps": len(seeds),
+        "samples": shard.samples, "left": int((shard.side > 0).sum()), "scans": len(shard.codes),
+        "neighbours": len(shard.node_scan) - shard.samples, "first_map": seeds[0], "maps": len(seeds),
         "splits": dict(zip(SPLITS, splits, strict=True)), "counts": dict(counts),
     }  # fmt: skip
     return to_bytes(shard), about
@@ -188,19 +189,20 @@ def data_card(manifest: dict[str, Any]) -> str:
                "unreachable", "nothing_ahead", "tie")  # fmt: skip
     lines = [f"| {name} | " + " | ".join(f"{row[c]}" for c in columns) + " |" for name, row in rows.items()]
     schema = "\n".join(f"- `{name}`: {text}" for name, text in manifest["schema"].items())
-    key = hashlib.sha256(json.dumps(manifest["sets"], sort_keys=True).encode()).hexdigest()[:16]
+    key = content_key(manifest, manifest["sets"])
     return f"""# Expert data for GIWT
 
 Made by `swarmscope giwt data` ({manifest["versions"]["swarmscope"]}, git {manifest["git"]}); content {key}.
 
-What a sample is: a robot with something in its way, its scan and those of the robots in its line of sight within 5 m, where
-they are, and the side on which the shortest way on the true map passes. Simulated: 20 x 20 m maps with walls round them,
-10 to 30 rectangles (A), cylinders (B) or both (C); starts and goals at random (I) or in columns (II). Sets `*-driven` are
-the key points of DH-Bug runs, the others robots placed at random with an obstacle in the safe area ahead.
+What a sample is: a robot with something in its way, its scan and those of the robots in its line of sight within
+5 m, where they are, and the side on which the shortest way on the true map passes. Simulated: 20 x 20 m maps with walls
+round them, 10 to 30 rectangles (A), cylinders (B) or both (C); starts and goals at random (I) or in columns (II).
+Sets `*-driven` are the key points of DH-Bug runs, the others robots placed at random with an obstacle in the safe area
+ahead.
 
-Left out and counted: nothing in the safe area (`clear_ahead`), no way to the goal (`unreachable`), nothing blocked on the
-line within 2.15 m at the width that ways are searched with (`nothing_ahead`), best ways on both sides within 0.1 m of
-each other (`tie`). Splits go by map: seed modulo 5 = 0, 1, 2 train, 3 validation, 4 test.
+Left out and counted: nothing in the safe area (`clear_ahead`), no way to the goal (`unreachable`), nothing blocked on
+the line within 2.15 m at the width that ways are searched with (`nothing_ahead`), best ways on both sides within 0.1 m
+of each other (`tie`). Splits go by map: seed modulo 5 = 0, 1, 2 train, 3 validation, 4 test.
 
 | set | {" | ".join(columns)} |
 |---|{"---|" * len(columns)}

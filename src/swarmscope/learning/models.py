@@ -41,7 +41,7 @@ class Architecture:
     """What a checkpoint must agree in to be loaded."""
 
     network: Network = "giwt"
-    channels: tuple[int, ...] = (32, 64, 64)
+    channels: tuple[int, ...] = (16, 32, 64)
     """Channels of the encoder's three blocks."""
     stem_stride: int = 2
     """Stride of the first convolution: 2 (kernel 5) takes a CPU a quarter of the time, 1 (kernel 3) is mini-VGG."""

@@ -1,8 +1,8 @@
-"""Data sets on disk: a folder with one folder for each set, shards of samples in it, and a manifest that knows them all.
+"""Data sets on disk: a folder with one folder of shards for each set, and a manifest that knows them all.
 
 A shard is a ``.npz`` of plain arrays (``SCHEMA``), read without unpickling anything. Scans are stored once per robot
-and drawn into pictures when they are loaded. ``manifest.json`` lists every shard with its SHA-256, its maps and what was
-left out; it is written anew after each shard, so that a stopped generation goes on where it was.
+and drawn into pictures when they are loaded. ``manifest.json`` lists every shard with its SHA-256, its maps and what
+was left out; it is written anew after each shard, so that a stopped generation goes on where it was.
 """
 
 from __future__ import annotations
@@ -83,9 +83,9 @@ def pack(samples: Iterable[tuple[int, Sample]]) -> Shard:
         rows.append((sample.label.side, sample.label.detour_m, sample.label.way_m, sample.goal_m, seed))
         places.append(sample.place)
     scans = np.array(codes, np.uint8).reshape(len(codes), -1)
-    node = np.array(nodes, np.float64).reshape(-1, 4).T
+    about_nodes = np.array(nodes, np.float64).reshape(-1, 4).T
     row = np.array(rows, np.float64).reshape(-1, 5).T
-    columns = (scans, *node, np.array(first), *row, np.array(places, np.float64).reshape(-1, 4))
+    columns = (scans, *about_nodes, np.array(first), *row, np.array(places, np.float64).reshape(-1, 4))
     return Shard(*(c.astype(kind) for c, (kind, _) in zip(columns, SCHEMA.values(), strict=True)))
 
 
@@ -122,7 +122,7 @@ def to_bytes(shard: Shard) -> bytes:
     with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED, compresslevel=5) as file:
         for name, values in zip(SCHEMA, shard, strict=True):
             part = io.BytesIO()
-            np.save(part, values, allow_pickle=False)
+            np.save(part, np.asarray(values), allow_pickle=False)
             file.writestr(zipfile.ZipInfo(f"{name}.npy", (1980, 1, 1, 0, 0, 0)), part.getvalue(), zipfile.ZIP_DEFLATED)
     return out.getvalue()
 
@@ -188,7 +188,8 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     try:
         manifest = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
-        raise InputFileError(path, "is missing: the folder is no data set (see 'swarmscope giwt data --help')") from None
+        why = "is missing: the folder is no data set (see 'swarmscope giwt data --help')"
+        raise InputFileError(path, why) from None
     except (OSError, ValueError) as error:
         raise InputFileError(path, f"cannot be read ({error})") from None
     if not isinstance(manifest, dict) or manifest.get("format") != FORMAT:
@@ -196,6 +197,12 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     if manifest.get("version") != VERSION:
         raise InputFileError(path, f"has version {manifest.get('version')!r}; this program reads version {VERSION}")
     return manifest
+
+
+def content_key(manifest: dict[str, Any], names: Iterable[str]) -> str:
+    """Return a hash of what some sets of a data folder contain."""
+    sums = {name: [shard["sha256"] for shard in manifest["sets"][name]["shards"]] for name in sorted(names)}
+    return hashlib.sha256(json.dumps(sums).encode()).hexdigest()[:16]
 
 
 def load(folder: Path, names: list[str] | None = None) -> dict[str, Shard]:

@@ -6,13 +6,14 @@ had happened.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 import os
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 import torch
@@ -25,7 +26,17 @@ from swarmscope.learning import checkpoints
 from swarmscope.learning.batches import Batch, batches
 from swarmscope.learning.config import TrainingConfig
 from swarmscope.learning.models import Architecture, Chooser
-from swarmscope.learning.records import SPLITS, Shard, concatenate, load, select, split_of, write_atomically
+from swarmscope.learning.records import (
+    SPLITS,
+    Shard,
+    concatenate,
+    content_key,
+    load,
+    read_manifest,
+    select,
+    split_of,
+    write_atomically,
+)
 
 LAST, BEST, HISTORY = "last.safetensors", "best.safetensors", "history.json"
 WEIGHTS = (0.1, 10.0)
@@ -66,7 +77,7 @@ def train(
     """
     set_up(config.threads, config.seed)
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
-    model = Chooser(architecture_of(config)).to(device, memory_format=torch.channels_last)
+    model = place(Chooser(architecture_of(config)), device)
     if init is not None:
         checkpoints.fill(model.encoder, "model.encoder.", checkpoints.read(init), init)
     optimizer = torch.optim.AdamW(model.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay)
@@ -76,9 +87,11 @@ def train(
     write_atomically(out / "config.json", (config.model_dump_json(indent=1) + "\n").encode())
     board = _Board(out / "tensorboard")
     steps = math.ceil(min(config.samples_per_epoch, training.samples) / config.batch)
-    about = {"config": config.model_dump(mode="json"), "versions": all_versions(), "git": git_revision(), "init": None}
-    if init is not None:
-        about["init"] = init.name
+    about: dict[str, Any] = {
+        "config": config.model_dump(mode="json"), "versions": all_versions(), "git": git_revision(),
+        "init": None if init is None else hashlib.sha256(init.read_bytes()).hexdigest(),
+        "data": content_key(read_manifest(data), config.sets),
+    }  # fmt: skip
     for epoch in range(len(history), config.epochs):
         begun = time.perf_counter()
         row = _epoch(model, optimizer, config, training, epoch, steps, device, report)
@@ -106,6 +119,11 @@ def set_up(threads: int, seed: int) -> None:
     torch.manual_seed(seed)
 
 
+def place(model: Chooser, device: torch.device) -> Chooser:
+    """Return the model on ``device``, its tensors in the order in which convolutions are fastest."""
+    return cast("Chooser", cast("Any", model).to(device, memory_format=torch.channels_last))
+
+
 def all_versions() -> dict[str, str]:
     """Return the versions that a trained model depends on."""
     import torch_geometric
@@ -128,7 +146,9 @@ def read_splits(config: TrainingConfig, data: Path) -> tuple[Shard, Shard]:
     return training, validation
 
 
-def _resume(config: TrainingConfig, out: Path, model: Chooser, optimizer: torch.optim.Optimizer) -> list[dict[str, float]]:
+def _resume(
+    config: TrainingConfig, out: Path, model: Chooser, optimizer: torch.optim.Optimizer
+) -> list[dict[str, float]]:
     """Load the last checkpoint in ``out`` if there is one; return the history so far."""
     path = out / LAST
     if not path.exists():
@@ -195,7 +215,8 @@ def schedule(progress: float, config: TrainingConfig) -> float:
     """Return the share of the full learning rate after ``progress`` epochs."""
     if progress < config.warm_up:
         return max(1e-3, progress / config.warm_up)
-    return 0.5 * (1.0 + math.cos(math.pi * min(1.0, (progress - config.warm_up) / max(1e-9, config.epochs - config.warm_up))))
+    left = min(1.0, (progress - config.warm_up) / max(1e-9, config.epochs - config.warm_up))
+    return 0.5 * (1.0 + math.cos(math.pi * left))
 
 
 def forward(model: Chooser, batch: Batch, device: torch.device) -> Tensor:
@@ -214,8 +235,8 @@ def autocast(config: TrainingConfig, device: torch.device) -> Any:
 
 def _computes_bfloat16(device: torch.device) -> bool:
     if device.type == "cuda":
-        return torch.cuda.is_bf16_supported()
-    return bool(torch.cpu._is_avx512_bf16_supported())
+        return bool(torch.cuda.is_bf16_supported())
+    return bool(cast("Any", torch.cpu)._is_avx512_bf16_supported())
 
 
 @torch.no_grad()
@@ -241,15 +262,15 @@ class _Board:
     def __init__(self, folder: Path) -> None:
         from torch.utils.tensorboard import SummaryWriter
 
-        self._writer = SummaryWriter(str(folder))  # type: ignore[no-untyped-call]
+        self._writer = SummaryWriter(str(folder))
 
     def add(self, epoch: int, row: dict[str, float]) -> None:
         """Add the figures of an epoch."""
         for name, value in row.items():
             if name != "epoch":
-                self._writer.add_scalar(name, value, epoch + 1)  # type: ignore[no-untyped-call]
-        self._writer.flush()  # type: ignore[no-untyped-call]
+                self._writer.add_scalar(name, value, epoch + 1)
+        self._writer.flush()
 
     def close(self) -> None:
         """Close the file."""
-        self._writer.close()  # type: ignore[no-untyped-call]
+        self._writer.close()

@@ -125,7 +125,8 @@ def load_network(folder: Path, planner: str, networks: frozenset[str] = frozense
     """Return the model in ``folder``; loaded once as long as its card stays the same."""
     _runtime(planner)
     card = read_card(folder, networks)
-    return _load(folder, json.dumps({key: card[key] for key in ("network", "files", "view_m", "sha256")}, sort_keys=True))
+    kept = {key: card[key] for key in ("network", "files", "view_m", "sha256")}
+    return _load(folder, json.dumps(kept, sort_keys=True))
 
 
 @lru_cache(maxsize=8)
