@@ -9,6 +9,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import yaml
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
@@ -83,17 +84,20 @@ def train_command(config: str, data: Path, out: Path | None, init: Path | None, 
     print(place / "best.safetensors")
 
 
-def eval_command(runs: Sequence[Path], data: Path, sets: Sequence[str], split: str, out: Path | None) -> None:
+def eval_command(
+    runs: Sequence[Path], data: Path, sets: Sequence[str], split: str, out: Path | None, pictures: Path | None
+) -> None:
     """Score trained networks on every set and compare the first with the others."""
     _need("torch", "torch_geometric", "safetensors")
-    from swarmscope.learning.evaluate import ahead_of, judge, majority, open_trained, read_test, regret, share
+    from swarmscope.learning.evaluate import ahead_of, data_key, judge, majority, open_trained, read_test, regret, share
     from swarmscope.learning.records import SPLITS
 
     if split not in SPLITS:
         raise ConfigError("--split", f"'{split}' is none of {', '.join(SPLITS)}")
     networks = [open_trained(path) for path in runs]
     shards = read_test(data, expand(sets), split)
-    result: dict[str, Any] = {"data": str(data), "split": split, "sets": {}}
+    result: dict[str, Any] = {"data": data_key(data, list(shards)), "split": split, "sets": {}}
+    everything: list[list[Any]] = [[] for _ in networks]
     table = Table(title=f"accuracy on {split} maps, % (95 % interval over maps)")
     for column in ("set", "samples", "majority", *(n.label for n in networks)):
         table.add_column(column, justify="right")
@@ -106,6 +110,8 @@ def eval_command(runs: Sequence[Path], data: Path, sets: Sequence[str], split: s
                 row = {"label": one.label, "checkpoint": str(one.path), "accuracy": share(verdict.hit, verdict.map)}
                 row |= {"regret_m": regret(verdict), "first_ahead": ahead_of(verdicts[0], verdict)}
                 rows.append({k: v._asdict() if hasattr(v, "_asdict") else v for k, v in row.items()})
+            for kept, verdict in zip(everything, verdicts, strict=True):
+                kept.append(verdict)
             most = majority(shard)
             result["sets"][name] = {"samples": shard.samples, "majority": most, "networks": rows}
             table.add_row(name, str(shard.samples), f"{100 * most:.1f}", *(_words(r["accuracy"]) for r in rows))
@@ -113,6 +119,8 @@ def eval_command(runs: Sequence[Path], data: Path, sets: Sequence[str], split: s
                 _save(out, result)
     means = [_mean(result, k) for k in range(len(networks))]
     table.add_row("mean", "", "", *(f"{100 * value:.2f}" for value in means))
+    joined = [[np.concatenate([getattr(v, part) for v in kept]) for part in ("hit", "map")] for kept in everything]
+    result["whole"] = [share(hit, maps)._asdict() for hit, maps in joined]
     result["mean_accuracy"] = {one.label: value for one, value in zip(networks, means, strict=True)}
     console = PlainConsole(width=None if sys.stdout.isatty() else 170)
     console.print(table)
@@ -121,6 +129,28 @@ def eval_command(runs: Sequence[Path], data: Path, sets: Sequence[str], split: s
     if out is not None:
         _save(out, result)
         print(out)
+    if pictures is not None:
+        _draw(pictures, networks, shards, result)
+
+
+def _draw(folder: Path, networks: Sequence[Any], shards: dict[str, Any], result: dict[str, Any]) -> None:
+    """Draw the first network's layers, and accuracy against radius where networks differ in it."""
+    from swarmscope.learning.evaluate import Score
+    from swarmscope.learning.figures import radius_png, tsne_png
+    from swarmscope.learning.records import concatenate, write_atomically
+
+    with _bar() as bar:
+        bar.add_task("pictures", total=None, note="")
+        whole = concatenate(list(shards.values()))
+        contents = {"layers.png": tsne_png(networks[0], whole)}
+        if len({one.config.view_m for one in networks}) > 1:
+            scores: dict[str, dict[float, Score]] = {}
+            for one, score in zip(networks, result["whole"], strict=True):
+                scores.setdefault(one.label, {})[one.config.view_m] = Score(**score)
+            contents["radius.png"] = radius_png(scores)
+    for name, data in contents.items():
+        write_atomically(folder / name, data)
+        print(folder / name)
 
 
 def export_command(run: Path, out: Path, scores: Path | None) -> None:

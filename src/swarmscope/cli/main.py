@@ -388,11 +388,12 @@ def giwt_eval(
     set_of: GiwtSets = None,
     split: Annotated[str, typer.Option(help="train, validation or test.")] = "test",
     out: Annotated[Path | None, typer.Option(help="JSON file for all figures.")] = None,
+    pictures: Annotated[Path | None, typer.Option(help="Folder for pictures of layers and of radii.")] = None,
 ) -> None:
     """Score trained networks on maps that no training saw."""
     from swarmscope.cli.giwt import eval_command
 
-    eval_command(runs, data, set_of or ["placed"], split, out)
+    eval_command(runs, data, set_of or ["placed"], split, out, pictures)
 
 
 @giwt.command("export", epilog="Example: [bold]swarmscope giwt export runs/giwt/giwt runs/giwt/model[/bold]")

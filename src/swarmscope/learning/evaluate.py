@@ -19,7 +19,7 @@ from swarmscope.learning import checkpoints
 from swarmscope.learning.batches import batches
 from swarmscope.learning.config import TrainingConfig, parse_config
 from swarmscope.learning.models import Chooser
-from swarmscope.learning.records import SPLITS, Shard, load, select, split_of
+from swarmscope.learning.records import SPLITS, Shard, content_key, load, read_manifest, select, split_of
 from swarmscope.learning.train import BEST, autocast, forward, place, set_up
 
 RESAMPLES = 2000
@@ -76,6 +76,11 @@ def read_test(data: Path, names: list[str], split: str = "test") -> dict[str, Sh
     """Return one split of each set."""
     whole = load(data, names)
     return {name: select(shard, split_of(shard.map) == SPLITS.index(split)) for name, shard in whole.items()}
+
+
+def data_key(data: Path, names: list[str]) -> str:
+    """Return what identifies the data that scores are of."""
+    return content_key(read_manifest(data), names)
 
 
 @torch.no_grad()
