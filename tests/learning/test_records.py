@@ -133,3 +133,17 @@ def test_driven_samples_are_the_key_points_of_the_runs():
     counts = about["counts"]
     assert counts["looked_at"] == sum(counts[k] for k in ("unreachable", "nothing_ahead", "tie", "labelled"))
     assert counts["labelled"] == about["samples"] > 300
+
+
+def test_views_are_turned_to_the_target_and_mirrored_about_it(folder):
+    pytest.importorskip("sklearn")
+    from swarmscope.learning.ceiling import contradictions, mirrored, view_vectors
+
+    shard = load(folder, ["B-II"])["B-II"]
+    vectors = view_vectors(shard, 2.5)
+    assert vectors.shape == (shard.samples, 360) and vectors.max() <= 2.5
+    assert vectors[:, 0].mean() < 0.8 < vectors[:, 180].mean()  # the obstacle ahead is near, what lies behind is not
+    assert np.array_equal(mirrored(mirrored(vectors)), vectors)
+    assert np.array_equal(mirrored(vectors)[:, 90], vectors[:, 270])
+    same = contradictions(shard, shard, 2.5)
+    assert same[-1].contradict == 0.0 and same[-1].difference_m == 0.0

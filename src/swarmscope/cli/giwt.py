@@ -153,6 +153,28 @@ def _draw(folder: Path, networks: Sequence[Any], shards: dict[str, Any], result:
         print(folder / name)
 
 
+def ceiling_command(data: Path, sets: Sequence[str], view_m: float) -> None:
+    """Print how often near twins contradict each other."""
+    _need("sklearn")
+    from swarmscope.learning.ceiling import contradictions
+    from swarmscope.learning.evaluate import read_test
+
+    names = expand(sets)
+    training, test = (read_test(data, names, split) for split in ("train", "test"))
+    table = Table(title=f"pairs of test and training samples that look alike within {view_m:g} m: sides that differ, %")
+    table.add_column("set", justify="right")
+    with _bar() as bar:
+        job = bar.add_task("twins", total=len(names), note="")
+        for name in names:
+            rows = contradictions(training[name], test[name], view_m)
+            if len(table.columns) == 1:
+                for row in rows:
+                    table.add_column(f"nearest {100 * row.share:g} %", justify="right")
+            table.add_row(name, *(f"{100 * row.contradict:.1f} (< {row.difference_m:.2f} m)" for row in rows))
+            bar.advance(job)
+    PlainConsole(width=None if sys.stdout.isatty() else 170).print(table)
+
+
 def export_command(run: Path, out: Path, scores: Path | None) -> None:
     """Write what a robot runs."""
     _need("torch", "torch_geometric", "safetensors", "onnx", "onnxruntime")

@@ -396,6 +396,18 @@ def giwt_eval(
     eval_command(runs, data, set_of or ["placed"], split, out, pictures)
 
 
+@giwt.command("ceiling", epilog="Example: [bold]swarmscope giwt ceiling --set-of driven --view 5[/bold]")
+def giwt_ceiling(
+    data: GiwtData = Path("runs/giwt/data"),
+    set_of: GiwtSets = None,
+    view: Annotated[float, typer.Option(min=0.1, help="Radius seen, metres.")] = 2.5,
+) -> None:
+    """Show how often the expert's sides differ between samples that look alike."""
+    from swarmscope.cli.giwt import ceiling_command
+
+    ceiling_command(data, set_of or ["placed"], view)
+
+
 @giwt.command("export", epilog="Example: [bold]swarmscope giwt export runs/giwt/giwt runs/giwt/model[/bold]")
 def giwt_export(
     run: Annotated[Path, typer.Argument(help="Run folder or checkpoint.")],
