@@ -86,9 +86,13 @@ def test_the_encoder_of_another_network_is_taken_over(data, tmp_path):
         train.train(config(channels=[4, 4, 4], **short), data, tmp_path / "no", tmp_path / "cnn" / "last.safetensors")
 
 
-@pytest.mark.parametrize("network", models.NETWORKS)
-def test_exported_files_answer_like_pytorch(network, tmp_path):
-    chosen = config(network=network)
+VARIANTS = [{"network": n} for n in models.NETWORKS]
+VARIANTS += [{"as_printed": True}, {"use_gain": False}, {"use_position": False}]
+
+
+@pytest.mark.parametrize("variant", VARIANTS, ids=str)
+def test_exported_files_answer_like_pytorch(variant, tmp_path):
+    chosen = config(**variant)
     torch.manual_seed(1)
     model = models.Chooser(train.architecture_of(chosen))
     for module in model.modules():
@@ -98,13 +102,13 @@ def test_exported_files_answer_like_pytorch(network, tmp_path):
     path = tmp_path / "model.safetensors"
     checkpoints.write(path, model, {"config": chosen.model_dump(mode="json")})
     assert export.export(path, tmp_path / "out") < 1e-4
-    assert json.loads((tmp_path / "out" / "model.json").read_text())["network"] == network
+    assert json.loads((tmp_path / "out" / "model.json").read_text())["network"] == chosen.network
 
 
-@pytest.mark.parametrize("network", models.NETWORKS)
-def test_absent_robots_and_their_order_do_not_matter(network, data):
+@pytest.mark.parametrize("variant", VARIANTS, ids=str)
+def test_absent_robots_and_their_order_do_not_matter(variant, data):
     torch.manual_seed(0)
-    model = models.Chooser(models.Architecture(network, (4, 8, 8))).eval()
+    model = models.Chooser(models.Architecture(channels=(4, 8, 8), **variant)).eval()
     features = torch.randn(5, 4, 128)
     cells = torch.tensor([[24, 3, 30, 12]] * 5)
     gains = torch.tensor([[0.0, 0.7, 0.2, 0.9]] * 5)

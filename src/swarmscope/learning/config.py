@@ -31,6 +31,8 @@ class TrainingConfig(BaseModel):
     stem_stride: Literal[1, 2] = 2
     use_gain: bool = True
     use_position: bool = True
+    as_printed: bool = False
+    """giwt: nothing beyond (4)-(9), see learning/models.py."""
     dropout: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.0
     view_m: Positive = VIEW_M
     """Radius of the pictures."""

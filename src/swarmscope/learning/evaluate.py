@@ -69,6 +69,7 @@ def open_trained(path: Path) -> Trained:
     if config.network == "giwt":
         without = [w for w, used in (("beta", config.use_gain), ("positions", config.use_position)) if not used]
         label += f" without {' and '.join(without)}" if without else ""
+        label += " as printed" if config.as_printed else ""
     return Trained(label, file, config, checkpoints.restore_model(found, file))
 
 

@@ -57,12 +57,14 @@ class StarPeer(nn.Module):
         """Return h (B, F); ``cells`` and ``gains`` are not used."""
         layer = self.layer
         if isinstance(layer, GATConv):
-            fused = layer.lin(features)
+            fused = layer.lin(features).unflatten(-1, (layer.heads, -1))
             source = (fused * layer.att_src[0]).sum(-1)
             target = (fused[:, :1] * layer.att_dst[0]).sum(-1)
             scores = nn.functional.leaky_relu(source + target, SLOPE)
-            weights = torch.softmax(scores + FAR_BELOW * (1.0 - present), dim=1) * present
-            return torch.relu((weights.unsqueeze(-1) * fused).sum(dim=1) + layer.bias)
+            there = present.unsqueeze(-1)
+            weights = torch.softmax(scores + FAR_BELOW * (1.0 - there), dim=1) * there
+            summed = (weights.unsqueeze(-1) * fused).sum(dim=1).flatten(1)
+            return torch.relu(summed + layer.res(features[:, 0]) + layer.bias)
         assert isinstance(layer, SAGEConv)  # noqa: S101 - a Peer has one of the two
         others = present[:, 1:].unsqueeze(-1)
         mean = (features[:, 1:] * others).sum(dim=1) / others.sum(dim=1).clamp(min=1.0)

@@ -13,6 +13,10 @@ cnn        the robot's own features only
 Readings of what is printed: (6) scores a pair by a learnt vector applied to LeakyReLU of the sum of both transformed
 features, with its own bias-free matrix for either end (GATv2, Brody et al. 2022). (9) has the matrix W of (5) a second
 time; we take another one, as W PF of W f + PE would only make W squared. beta of a robot to itself is 0, sigma is ReLU.
+
+Three things go beyond the print, as in the peers' layers, and are left out with ``as_printed``: HEADS heads of
+attention; the robot's own features have a matrix of their own in (9), or they drown in the neighbours' (graphsage has
+one, gat gets one); LeakyReLU in (5), because else (9) sees positions as a constant, whatever the neighbour there sees.
 """
 
 from __future__ import annotations
@@ -31,6 +35,8 @@ Network = Literal["giwt", "gat", "graphsage", "cnn"]
 NETWORKS: tuple[Network, ...] = ("giwt", "gat", "graphsage", "cnn")
 HIDDEN = 16
 """Width of the mapper's middle layer."""
+HEADS = 4
+"""Of attention in giwt and gat; each has FEATURES / HEADS channels."""
 SLOPE = 0.2
 """Of the leaky part of LeakyReLU."""
 FAR_BELOW = -1e9
@@ -49,6 +55,8 @@ class Architecture:
     """giwt: with beta of (8)."""
     use_position: bool = True
     """giwt: with the position embedding (4)."""
+    as_printed: bool = False
+    """giwt: one head, own features only as one of the robots, (5) linear."""
     dropout: float = 0.0
     """Of the features before the mapper."""
 
@@ -82,16 +90,20 @@ class Encoder(nn.Module):
 class Giwt(nn.Module):
     """Graph attention with information gain weight (4)-(9), for the decider, who is robot 0 of each row."""
 
-    def __init__(self, use_gain: bool, use_position: bool) -> None:
+    def __init__(self, use_gain: bool, use_position: bool, as_printed: bool) -> None:
         super().__init__()
         self.use_gain = use_gain
+        self.heads = 1 if as_printed else HEADS
+        self.own = None if as_printed else nn.Linear(FEATURES, FEATURES, bias=False)
+        self.bend = nn.Identity() if as_printed else nn.LeakyReLU(SLOPE)
         self.embed = nn.Embedding(GRID * GRID, FEATURES) if use_position else None
         if self.embed is not None:
             nn.init.normal_(self.embed.weight, std=0.1)
         self.transform = nn.Linear(FEATURES, FEATURES, bias=False)
         self.query = nn.Linear(FEATURES, FEATURES, bias=False)
         self.key = nn.Linear(FEATURES, FEATURES, bias=False)
-        self.score = nn.Linear(FEATURES, 1, bias=False)
+        self.score = nn.Parameter(torch.empty(self.heads, FEATURES // self.heads))
+        nn.init.xavier_uniform_(self.score)
         self.value = nn.Linear(FEATURES, FEATURES)
         self.slope = nn.LeakyReLU(SLOPE)
 
@@ -100,12 +112,18 @@ class Giwt(nn.Module):
         fused = self.transform(features)
         if self.embed is not None:
             fused = fused + self.embed(cells)
-        scores = self.score(self.slope(self.query(fused[:, :1]) + self.key(fused))).squeeze(-1)
-        weights = torch.softmax(scores + FAR_BELOW * (1.0 - present), dim=1)
+        fused = self.bend(fused)
+        pairs = self.slope(self.query(fused[:, :1]) + self.key(fused)).unflatten(-1, (self.heads, -1))
+        scores = (pairs * self.score).sum(-1)
+        weights = torch.softmax(scores + FAR_BELOW * (1.0 - present).unsqueeze(-1), dim=1)
         if self.use_gain:
-            weights = weights + gains
-        weights = weights * present
-        return torch.relu((weights.unsqueeze(-1) * self.value(fused)).sum(dim=1))
+            weights = weights + gains.unsqueeze(-1)
+        weights = weights * present.unsqueeze(-1)
+        values = self.value(fused).unflatten(-1, (self.heads, -1))
+        summed = (weights.unsqueeze(-1) * values).sum(dim=1).flatten(1)
+        if self.own is not None:
+            summed = summed + self.own(features[:, 0])
+        return torch.relu(summed)
 
 
 class Peer(nn.Module):
@@ -164,9 +182,10 @@ class Chooser(nn.Module):
 
 def _fusion(architecture: Architecture) -> nn.Module:
     if architecture.network == "giwt":
-        return Giwt(architecture.use_gain, architecture.use_position)
+        return Giwt(architecture.use_gain, architecture.use_position, architecture.as_printed)
     if architecture.network == "gat":
-        return Peer(GATConv(FEATURES, FEATURES, negative_slope=SLOPE, add_self_loops=False))
+        width = FEATURES // HEADS
+        return Peer(GATConv(FEATURES, width, HEADS, negative_slope=SLOPE, add_self_loops=False, residual=True))
     if architecture.network == "graphsage":
         return Peer(SAGEConv(FEATURES, FEATURES))
     return Alone()

@@ -59,7 +59,8 @@ def architecture_of(config: TrainingConfig) -> Architecture:
     giwt = config.network == "giwt"
     return Architecture(
         config.network, tuple(config.channels), config.stem_stride,
-        config.use_gain if giwt else False, config.use_position if giwt else False, config.dropout,
+        config.use_gain if giwt else False, config.use_position if giwt else False,
+        config.as_printed if giwt else False, config.dropout,
     )  # fmt: skip
 
 
