@@ -95,3 +95,12 @@ def test_laws(robots: list[tuple[float, float, bool]]) -> None:
     turned = [f(travelled[::-1], shortest[::-1], some[::-1]) for f in (metrics.spl, metrics.path_redundancy)]
     same = [f(travelled, shortest, some) for f in (metrics.spl, metrics.path_redundancy)]
     np.testing.assert_allclose(turned, same)
+
+
+def test_who_had_to_move_and_how_often_sides_were_right():
+    starts = np.array([[0.0, 0.0, 1.0], [1.0, 1.0, 0.0], [2.0, 0.0, 0.0]])
+    goals = np.array([[0.0, 3.0], [1.0, 1.05], [2.0, 0.0]])
+    assert metrics.had_to_move(starts, goals).tolist() == [True, False, False]
+    side, told = np.array([1, 1, -1, -1, 1]), np.array([1, -1, -1, 0, 1])
+    assert metrics.side_accuracy(side, told) == 0.75
+    assert np.isnan(metrics.side_accuracy(side, np.zeros(5, int)))

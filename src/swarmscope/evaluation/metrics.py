@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
+AT_GOAL_M = 0.1  # who starts no farther from its goal has nowhere to go
 STANDING_MPS = 0.02  # a robot slower than this waits
 
 
@@ -45,6 +46,10 @@ METRICS: list[Metric] = [
 ]
 COUNTED: list[Metric] = [
     Metric("path_stretch_any_angle", "", "lower", "sum(l) / sum of the true shortest ways, robots that arrived"),
+    Metric("mover_path_m", "m", "lower", "mean length travelled by robots that had somewhere to go and arrived"),
+    Metric("mover_arrival_rate", "", "higher", "share of robots that had somewhere to go and arrived"),
+    Metric("side_accuracy", "", "higher", "share of choices on the side of the shortest way (with judge_sides)"),
+    Metric("sides_judged", "", "neither", "choices where the shortest way has a side"),
     Metric("planning_failures", "", "lower", "robots that did not arrive in time (N_a)"),
     Metric("collisions", "", "lower", "robots that touched something"),
     Metric("min_clearance_m", "m", "higher", "smallest distance of any robot to anything"),
@@ -208,6 +213,18 @@ def all_metrics(
         "bytes_per_robot_s": bytes_per_robot_s(bytes_sent, t_s, arrival_s),
     }
     return {metric.name: values[metric.name] for metric in METRICS}
+
+
+def had_to_move(starts: Floats, goals: Floats) -> Bools:
+    """Say (N,) which robots start farther than AT_GOAL_M from their goals; starts (N, 2+), goals (N, 2) [m]."""
+    apart = np.asarray(goals) - np.asarray(starts)[:, :2]
+    return np.asarray(np.hypot(apart[:, 0], apart[:, 1]) > AT_GOAL_M)
+
+
+def side_accuracy(side: NDArray[np.integer], told_side: NDArray[np.integer]) -> float:
+    """Return the share of choices ``side (K,)`` that are the expert's, of those where ``told_side (K,)`` is not 0."""
+    judged = told_side != 0
+    return _ratio(float((side[judged] == told_side[judged]).sum()), float(judged.sum()))
 
 
 def _under_way(t_s: Floats, arrival_s: Floats) -> Bools:

@@ -12,7 +12,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from swarmscope.evaluation.metrics import all_metrics, path_lengths, path_stretch
+from swarmscope.evaluation.metrics import (
+    all_metrics,
+    arrival_rate,
+    average_path_length_m,
+    had_to_move,
+    path_lengths,
+    path_stretch,
+    side_accuracy,
+)
 from swarmscope.evaluation.provenance import git_revision, versions
 from swarmscope.evaluation.run_folder import check_out, write_run
 from swarmscope.evaluation.scenario import Scenario, complete, make_setting, make_setup
@@ -57,16 +65,15 @@ def play(
     progress: Callable[[float, int], None] | None = None,
     any_angle: bool = True,
     references: References | None = None,
-    judge_sides: bool = False,
 ) -> Outcome:
     """Run the scenario and find the reference ways; ``progress(simulated seconds, robots done)``.
 
     ``references`` of the same world are taken as they are. Planners that declare ``TOLD_SIDE`` are told the side of
-    the shortest way; ``judge_sides`` notes it beside every choice of the others, who never see it.
+    the shortest way; the scenario's ``judge_sides`` notes it beside every choice of the others.
     """
     setup = make_setup(scenario)
     setting = make_setting(scenario, setup, threads)
-    if judge_sides or getattr(setting.planner, "TOLD_SIDE", False):
+    if scenario.judge_sides or getattr(setting.planner, "TOLD_SIDE", False):
         keeps_off = scenario.robot.radius_m + scenario.safety.margin_m
         horizon = max(setting.rig.look_ahead, setting.rig.protection.l_th) + setting.rig.body.radius
         setting = replace(setting, advice=make_advice(setup, keeps_off, horizon))
@@ -135,7 +142,15 @@ def figures(outcome: Outcome) -> dict[str, Any]:
     )
     simulated = len(trace.t_s) * outcome.setting.dt
     features = int(robots["sent_features"].sum())
+    movers = had_to_move(outcome.setup.starts, outcome.setup.goals)
+    travelled = path_lengths(x, y, t_s, robots["arrival_s"])
+    choices = trace.choices
+    judged = int((choices["told_side"] != 0).sum())
     values |= {
+        "mover_path_m": average_path_length_m(travelled[movers], robots["arrival_s"][movers]),
+        "mover_arrival_rate": arrival_rate(robots["arrival_s"][movers]),
+        "side_accuracy": side_accuracy(choices["side"], choices["told_side"]) if judged else None,
+        "sides_judged": judged,
         "path_stretch_any_angle": stretch,
         "reference_robots": int(np.isfinite(outcome.references.shortest_m).sum()),
         "planning_failures": int((~np.isfinite(robots["arrival_s"])).sum()),

@@ -69,7 +69,7 @@ def estimate_weight(experiment: Experiment) -> WeightResult:
     counts = []
     for seed in seeds:
         scenario = parse_scenario(keys | {"seed": seed, "record_scans": "no"}, "weight")
-        outcome = play(scenario, any_angle=False, judge_sides=True)
+        outcome = play(scenario.model_copy(update={"judge_sides": True}), any_angle=False)
         counts.append(count_errors(outcome.trace.choices))
     protection = outcome.setting.rig.protection
     return weight_of(np.array(counts), protection.sigma_a, seeds)

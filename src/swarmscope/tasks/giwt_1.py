@@ -5,7 +5,8 @@ The robots that stand are already at their goals: they see and answer, and are i
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -23,6 +24,8 @@ SUMMARY = "GIWT's task I: random starts and goals on a random map; by default ro
 
 FREE_M = 0.25  # from a start or goal to an obstacle, beyond the robot's radius
 APART_M = 1.0  # between two robots
+CROWD = 40
+"""With more robots the map grows."""
 DRAWS = 50
 TRIES = 4000
 
@@ -39,7 +42,7 @@ class Options(MapOptions):
 def make(seed: int, robots: int = 15, radius: float = 0.15, **options: Option) -> Setup:
     """Return a solvable map with robots in its free space; options are the fields of `Options`."""
     check_robots(robots, radius)
-    chosen = read_options(Options, options, NAME)
+    chosen = grown(read_options(Options, options, NAME), robots)
     for draw in range(DRAWS):
         rng = np.random.default_rng([seed, draw])
         world = draw_map(rng, chosen, np.zeros((0, 2)), 0.0)
@@ -52,6 +55,13 @@ def make(seed: int, robots: int = 15, radius: float = 0.15, **options: Option) -
         yaw = yaw_toward(points[:, 0], points[:, 1], goals[:, 0], goals[:, 1])
         return Setup(world, np.column_stack([points, yaw]), goals)
     raise unsolvable(NAME, seed, DRAWS, f"{robots} robots do not fit")
+
+
+def grown(options: Options, robots: int) -> Options:
+    """Return the options with a map that has room for ``robots`` robots, obstacles as dense as before."""
+    times = max(1.0, robots / CROWD)
+    size, few, many = options.size_m * math.sqrt(times), options.fewest * times, options.most * times
+    return replace(options, size_m=size, fewest=few, most=many)
 
 
 def scatter(

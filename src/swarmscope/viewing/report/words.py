@@ -28,6 +28,10 @@ TITLES = {
     "waiting_s": "Waiting time",
     "mean_speed_mps": "Mean speed",
     "bytes_per_robot_s": "Bytes per robot and second",
+    "mover_path_m": "Path length APL",
+    "mover_arrival_rate": "Success rate SR",
+    "side_accuracy": "Accuracy of sides Acc",
+    "sides_judged": "Sides judged",
     "planning_failures": "Planning failures N_a",
     "fusions": "Fusions N_u",
     "bandwidth_kbps": "Bandwidth",
@@ -37,7 +41,12 @@ TITLES = {
     "plan_us_p99": "t_plan, 99th percentile",
     "bytes_on_air": "Bytes on air per run",
 }
-SHARES = frozenset({"arrival_rate", "collision_rate", "path_redundancy", "path_redundancy_all", "spl"})
+SHARES = frozenset(
+    {
+        "arrival_rate", "collision_rate", "path_redundancy", "path_redundancy_all", "spl",
+        "mover_arrival_rate", "side_accuracy",
+    }
+)  # fmt: skip
 RATIOS = frozenset({"path_stretch", "path_stretch_any_angle"})
 SUMMARIES = {
     "path_redundancy": "γ = 1 − AR Σl* / Σl, sums over the robots that arrived",
