@@ -45,6 +45,10 @@ METRICS: list[Metric] = [
 ]
 COUNTED: list[Metric] = [
     Metric("path_stretch_any_angle", "", "lower", "sum(l) / sum of the true shortest ways, robots that arrived"),
+    Metric("mover_path_m", "m", "lower", "mean length travelled by robots that had to move and arrived (APL)"),
+    Metric("mover_arrival_rate", "", "higher", "share of robots that had to move that arrived (SR)"),
+    Metric("side_accuracy", "", "higher", "share of judged choices that took the side of the shortest way (Acc)"),
+    Metric("sides_judged", "", "neither", "choices of a side where the shortest way has one, all robots"),
     Metric("planning_failures", "", "lower", "robots that did not arrive in time (N_a)"),
     Metric("collisions", "", "lower", "robots that touched something"),
     Metric("min_clearance_m", "m", "higher", "smallest distance of any robot to anything"),
@@ -133,6 +137,35 @@ def spl(travelled_m: Floats, shortest_m: Floats, arrival_s: Floats) -> float:
 def average_path_length_m(travelled_m: Floats, arrival_s: Floats) -> float:
     """Return the mean length [m] of the ways of robots that arrived (APL of SFM-MAS and GIWT)."""
     return _mean(travelled_m[arrived(arrival_s)])
+
+
+def movers(starts_m: Floats, goals_m: Floats, arrive_m: float) -> Bools:
+    """Say of each robot (N,) whether it starts farther than ``arrive_m`` from its goal.
+
+    ``starts_m`` are (N, 2 or 3), ``goals_m`` (N, 2) [m].
+    """
+    away: Bools = np.hypot(*(goals_m[:, :2] - starts_m[:, :2]).T) > arrive_m
+    return away
+
+
+def mover_path_m(travelled_m: Floats, arrival_s: Floats, moves: Bools) -> float:
+    """Return the mean length [m] of the ways of robots that had to move and arrived (APL of GIWT, Table II)."""
+    return _mean(travelled_m[moves & arrived(arrival_s)])
+
+
+def mover_arrival_rate(arrival_s: Floats, moves: Bools) -> float:
+    """Return the share of robots that had to move that arrived (SR of GIWT, Table II)."""
+    return _mean(arrived(arrival_s)[moves])
+
+
+def sides_judged(told_side: NDArray[np.integer]) -> int:
+    """Return how many choices (C,) have a side of the shortest way: ``told_side`` +1 left, -1 right, 0 none."""
+    return int(np.count_nonzero(told_side))
+
+
+def side_accuracy(side: NDArray[np.integer], told_side: NDArray[np.integer]) -> float:
+    """Return the share of judged choices that took the side of the shortest way (Acc of GIWT, Table II)."""
+    return _mean((side == told_side)[told_side != 0])
 
 
 def duration_s(arrival_s: Floats) -> float:

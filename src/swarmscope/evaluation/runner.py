@@ -12,7 +12,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from swarmscope.evaluation.metrics import all_metrics, path_lengths, path_stretch
+from swarmscope.evaluation.metrics import (
+    all_metrics,
+    mover_arrival_rate,
+    mover_path_m,
+    movers,
+    path_lengths,
+    path_stretch,
+    side_accuracy,
+    sides_judged,
+)
 from swarmscope.evaluation.provenance import git_revision, versions
 from swarmscope.evaluation.run_folder import check_out, write_run
 from swarmscope.evaluation.scenario import Scenario, complete, make_setting, make_setup
@@ -24,6 +33,8 @@ from swarmscope.tasks import Setup
 
 ANY_ANGLE_ROBOTS = 50
 """With more robots the any-angle reference, which takes longer than the run, is left out."""
+ARRIVE_M = 0.05
+"""Distance to the goal at which robots have arrived whose planner has no parameter ``arrive_m``."""
 KILO = 1000.0
 SEARCHED_M2 = 1e6
 """Sum of (start to goal)^2 over the robots that get an A* reference: some 5 s of search."""
@@ -57,16 +68,15 @@ def play(
     progress: Callable[[float, int], None] | None = None,
     any_angle: bool = True,
     references: References | None = None,
-    judge_sides: bool = False,
 ) -> Outcome:
     """Run the scenario and find the reference ways; ``progress(simulated seconds, robots done)``.
 
-    ``references`` of the same world are taken as they are. Planners that declare ``TOLD_SIDE`` are told the side of
-    the shortest way; ``judge_sides`` notes it beside every choice of the others, who never see it.
+    ``references`` of the same world are taken as they are. The side of the shortest way is found for planners that
+    declare ``TOLD_SIDE``, and where the scenario says ``judge_sides``: then it is noted beside every choice.
     """
     setup = make_setup(scenario)
     setting = make_setting(scenario, setup, threads)
-    if judge_sides or getattr(setting.planner, "TOLD_SIDE", False):
+    if scenario.judge_sides or getattr(setting.planner, "TOLD_SIDE", False):
         keeps_off = scenario.robot.radius_m + scenario.safety.margin_m
         horizon = max(setting.rig.look_ahead, setting.rig.protection.l_th) + setting.rig.body.radius
         setting = replace(setting, advice=make_advice(setup, keeps_off, horizon))
@@ -130,13 +140,19 @@ def figures(outcome: Outcome) -> dict[str, Any]:
             outcome.references.shortest_m,
         )
     )
-    stretch = path_stretch(
-        path_lengths(x, y, t_s, robots["arrival_s"]), outcome.references.any_angle_m, robots["arrival_s"]
-    )
+    travelled = path_lengths(x, y, t_s, robots["arrival_s"])
+    stretch = path_stretch(travelled, outcome.references.any_angle_m, robots["arrival_s"])
+    arrive_m = float(getattr(outcome.setting.params, "arrive_m", ARRIVE_M))
+    moved = movers(outcome.setup.starts, outcome.setup.goals, arrive_m)
+    sides, told = trace.choices["side"], trace.choices["told_side"]
     simulated = len(trace.t_s) * outcome.setting.dt
     features = int(robots["sent_features"].sum())
     values |= {
         "path_stretch_any_angle": stretch,
+        "mover_path_m": mover_path_m(travelled, robots["arrival_s"], moved),
+        "mover_arrival_rate": mover_arrival_rate(robots["arrival_s"], moved),
+        "side_accuracy": side_accuracy(sides, told) if told.any() else None,
+        "sides_judged": sides_judged(told),
         "reference_robots": int(np.isfinite(outcome.references.shortest_m).sum()),
         "planning_failures": int((~np.isfinite(robots["arrival_s"])).sum()),
         "collisions": int(robots["crashed"].sum()),

@@ -142,6 +142,8 @@ class Scenario(_Strict):
     limit_s: Positive = 300.0
     substeps: Annotated[int, Field(ge=1, le=1000)] = 20
     record_scans: Literal["auto", "yes", "no"] = "auto"
+    judge_sides: bool = False
+    """Note the side of the shortest way beside every choice; planners with ``told`` set take it."""
 
     @model_validator(mode="after")
     def _one_place(self) -> Self:
