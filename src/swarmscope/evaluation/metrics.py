@@ -47,6 +47,7 @@ COUNTED: list[Metric] = [
     Metric("path_stretch_any_angle", "", "lower", "sum(l) / sum of the true shortest ways, robots that arrived"),
     Metric("mover_path_m", "m", "lower", "mean length travelled by robots that had to move and arrived (APL)"),
     Metric("mover_arrival_rate", "", "higher", "share of robots that had to move that arrived (SR)"),
+    Metric("movers", "", "neither", "robots that start away from their goals"),
     Metric("side_accuracy", "", "higher", "share of judged choices that took the side of the shortest way (Acc)"),
     Metric("sides_judged", "", "neither", "choices of a side where the shortest way has one, all robots"),
     Metric("planning_failures", "", "lower", "robots that did not arrive in time (N_a)"),

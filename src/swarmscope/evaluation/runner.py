@@ -151,6 +151,7 @@ def figures(outcome: Outcome) -> dict[str, Any]:
         "path_stretch_any_angle": stretch,
         "mover_path_m": mover_path_m(travelled, robots["arrival_s"], moved),
         "mover_arrival_rate": mover_arrival_rate(robots["arrival_s"], moved),
+        "movers": int(moved.sum()),
         "side_accuracy": side_accuracy(sides, told) if told.any() else None,
         "sides_judged": sides_judged(told),
         "reference_robots": int(np.isfinite(outcome.references.shortest_m).sum()),
