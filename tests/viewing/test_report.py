@@ -185,7 +185,7 @@ def test_the_gap_table_says_what_share_is_closed_beside_the_published_one():
     rows = rows_of(table)
     assert list(rows) == ["Right", "Ours", "Told"]
     # (4 + 4 + 4 + 4) m of 81 m, and of the 32 m that Told saves
-    assert rows["Ours"][0].startswith("19.8 % | [19.5, 20.0] % | closes 50.0 % [50.0, 50.0] % | 4 robots, 2 maps")
+    assert rows["Ours"][0].startswith("19.8 % | [19.5, 20.0] | closes 50.0 % [50.0, 50.0] | 4 robots, 2 maps")
     assert rows["Ours"][0].endswith("published 5.0 %, closes 20 %")
     assert "closes" not in rows["Told"][0] and rows["Told"][0].endswith("published 25.0 %")
     assert rows["Ours"][1] == "not run"

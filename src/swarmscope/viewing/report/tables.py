@@ -158,7 +158,7 @@ def _gap(material: Material, place: str, planner: str) -> Value:
         text += f", closes {100.0 * (worst - ours) / (worst - best):.0f} %"
     outside = not found.reduction.low <= printed <= found.reduction.high and math.isfinite(found.reduction.low)
     mark: Mark = "" if not outside else "good" if found.reduction.estimate > printed else "bad"
-    return [*lines, Line(text, "sub", mark)]
+    return [*lines, Line(text.replace("-", "−"), "sub", mark)]
 
 
 def _share(found: Interval) -> str:
@@ -166,7 +166,7 @@ def _share(found: Interval) -> str:
 
 
 def _shares(found: Interval) -> str:
-    bounds = f"[{100.0 * found.low:.1f}, {100.0 * found.high:.1f}] %".replace("-", "−")
+    bounds = f"[{100.0 * found.low:.1f}, {100.0 * found.high:.1f}]".replace("-", "−")
     return bounds if math.isfinite(found.low) else ""
 
 
