@@ -81,3 +81,23 @@ def test_files(tmp_path):
     file.write_text("- 1")
     with pytest.raises(ConfigError, match="mapping"):
         load_experiment(Path(file))
+
+
+def test_gap_and_flow_time_name_planners():
+    asked = small(gap={"worst": "alone", "best": "Nav-SCOPE"}, flow_time="alone")
+    assert asked.gap.worst == "alone" and asked.flow_time == "alone"
+    assert "gap: unknown planner 'Nav'" in wrong(gap={"worst": "alone", "best": "Nav"})
+    assert "same planner" in wrong(gap={"worst": "alone", "best": "alone"})
+    assert "did you mean 'worst'" in wrong(gap={"worst": "alone", "best": "Nav-SCOPE", "wors": "alone"})
+    assert "flow_time: unknown planner 'alon'; did you mean 'alone'" in wrong(flow_time="alon")
+
+
+def test_table_two_of_giwt_is_complete():
+    giwt = load_experiment(shipped_experiment("giwt"))
+    found = units(giwt)
+    assert len({u.seed for u in found}) == 500 and len(found) == 3 * 11 * 500
+    assert all(u.scenario.judge_sides and u.scenario.limit_s == 300.0 for u in found)
+    told = {u.planner for u in found if u.scenario.planner.params.get("told")}
+    assert told == {"A* sides"}
+    of_table_two = [table for table in giwt.published if table.source == "GIWT, Table II"]
+    assert [len(row) for table in of_table_two for row in table.values.values()] == [6] * 6

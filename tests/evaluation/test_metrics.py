@@ -39,6 +39,27 @@ def test_worked_by_hand() -> None:
     assert metrics.bytes_per_robot_s(np.array([[0, 0, 0], [50, 60, 60]]), t_s, arrival) == 5.0
 
 
+def test_robots_that_had_to_move_are_judged_apart() -> None:
+    starts = np.array([[0.0, 0.0, 1.0], [5.0, 5.0, 0.0], [1.0, 1.0, 0.0], [2.0, 0.0, 0.0]])
+    goals = np.array([[3.0, 4.0], [5.03, 5.03], [1.0, 3.0], [2.0, 9.0]])
+    moves = metrics.movers(starts, goals, 0.05)
+    assert moves.tolist() == [True, False, True, True]
+    travelled, arrival = np.array([6.0, 0.0, 50.0, 10.0]), np.array([20.0, 0.0, NAN, 30.0])
+    assert metrics.mover_path_m(travelled, arrival, moves) == 8.0
+    assert metrics.mover_arrival_rate(arrival, moves) == pytest.approx(2 / 3)
+    nobody = np.zeros(4, bool)
+    assert math.isnan(metrics.mover_path_m(travelled, arrival, nobody))
+    assert math.isnan(metrics.mover_arrival_rate(arrival, nobody))
+    assert math.isnan(metrics.mover_path_m(travelled, np.full(4, NAN), moves))
+
+
+def test_sides_are_judged_where_the_shortest_way_has_one() -> None:
+    side, told = np.array([1, -1, 1, 1, -1], np.int8), np.array([1, 1, 0, 1, -1], np.int8)
+    assert metrics.side_accuracy(side, told) == 0.75 and metrics.sides_judged(told) == 4
+    assert math.isnan(metrics.side_accuracy(side, np.zeros(5, np.int8)))
+    assert metrics.sides_judged(np.zeros(0, np.int8)) == 0
+
+
 def test_waiting_counts_standing_before_the_arrival() -> None:
     speed = np.array([[0.5, 0.0], [0.01, -0.5], [0.5, 0.0], [0.0, 0.019], [0.0, 0.0]])
     np.testing.assert_allclose(metrics.waiting_times(speed, T_S, ARRIVAL), [1.0, 3.0])
@@ -95,12 +116,3 @@ def test_laws(robots: list[tuple[float, float, bool]]) -> None:
     turned = [f(travelled[::-1], shortest[::-1], some[::-1]) for f in (metrics.spl, metrics.path_redundancy)]
     same = [f(travelled, shortest, some) for f in (metrics.spl, metrics.path_redundancy)]
     np.testing.assert_allclose(turned, same)
-
-
-def test_who_had_to_move_and_how_often_sides_were_right():
-    starts = np.array([[0.0, 0.0, 1.0], [1.0, 1.0, 0.0], [2.0, 0.0, 0.0]])
-    goals = np.array([[0.0, 3.0], [1.0, 1.05], [2.0, 0.0]])
-    assert metrics.had_to_move(starts, goals).tolist() == [True, False, False]
-    side, told = np.array([1, 1, -1, -1, 1]), np.array([1, -1, -1, 0, 1])
-    assert metrics.side_accuracy(side, told) == 0.75
-    assert np.isnan(metrics.side_accuracy(side, np.zeros(5, int)))

@@ -3,7 +3,16 @@ import math
 import numpy as np
 import pytest
 
-from swarmscope.evaluation.results import Run, grouped, paired, pooled_figures, time_budget, values_of
+from swarmscope.evaluation.results import (
+    Run,
+    flow_time_increases,
+    grouped,
+    paired,
+    path_gap,
+    pooled_figures,
+    time_budget,
+    values_of,
+)
 
 
 def run(planner="ours", seed=0, travelled=(10.0, 12.0), shortest=(10.0, 10.0), arrival=(22.0, 30.0), **figures):
@@ -42,3 +51,30 @@ def test_the_time_budget_adds_up():
     assert found == pytest.approx((20.0, 2.0, 1.0, 3.0, 4.0, 30.0))
     assert sum(found[:5]) == pytest.approx(found.duration_s)
     assert math.isnan(time_budget([run(arrival=(math.nan, math.nan), duration_s=None)]).duration_s)
+
+
+def test_the_gap_is_taken_over_robots_that_arrived_with_all():
+    late = math.nan
+    worst = [run("left", travelled=(20.0, 30.0)), run("left", seed=1, travelled=(10.0, 0.0))]
+    ours = [
+        run(travelled=(16.0, 99.0), arrival=(40.0, late)),
+        run(seed=1, travelled=(9.0, 0.0)),
+        run(seed=2, travelled=(5.0, 5.0)),
+    ]
+    best = [run("told", travelled=(12.0, 15.0)), run("told", seed=1, travelled=(9.0, 0.0), arrival=(late, 1.0))]
+    found = path_gap(ours, worst, best)
+    assert found.reduction.estimate == pytest.approx((4.0 + 1.0) / 30.0)
+    assert (found.reduction.used, found.robots) == (2, 2)  # who stands at its goal does not count
+    assert found.closed.estimate == pytest.approx(4.0 / 8.0) and found.closed.used == 1
+    assert path_gap(best, worst, best).closed.estimate == 1.0
+    nothing = path_gap([run(seed=7)], worst, best)
+    assert math.isnan(nothing.reduction.estimate) and nothing.reduction.used == nothing.robots == 0
+
+
+def test_flow_time_increases_are_of_robots_with_a_way_that_arrived():
+    runs = [
+        run(travelled=(12.0, 15.0), shortest=(10.0, 10.0)),
+        run(travelled=(0.0, 50.0), shortest=(0.0, 10.0), arrival=(0.0, math.nan)),
+    ]
+    assert flow_time_increases(runs) == pytest.approx([0.2, 0.5])
+    assert len(flow_time_increases([])) == 0

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from helpers import circle, place_scenario
+from helpers import circle, place_scenario, wall
 from swarmscope.errors import ConfigError
 from swarmscope.evaluation import runner
 from swarmscope.evaluation.run_folder import read_config, read_metrics, read_trajectory, read_world
@@ -136,6 +136,35 @@ def test_robots_that_collided_are_counted_and_named():
     figures = runner.figures(outcome)
     assert figures["collisions"] == 1
     assert figures["failures"][2] == {"robot": 2, "why": "collided"}
+
+
+BLOCKED = place_scenario(
+    [(0.0, 0.0, 0.0), (-1.0, 3.0, 0.0)], [(8.0, 0.0), (-1.0, 3.0)], [wall((4.0, -4.0), (4.0, 2.0))],
+    lidar={"beams": 120}, limit_s=60.0,
+)  # fmt: skip
+"""Robot 0 passes a wall, whose nearer end is on the left; robot 1 stands at its goal."""
+
+
+def figures_of(params, **values):
+    scenario = BLOCKED | {"planner": {"name": "dh-bug", "params": params}} | values
+    return runner.figures(runner.play(parse_scenario(scenario, "test")))
+
+
+def test_choices_are_judged_and_told_when_the_scenario_says_so():
+    left, right = (figures_of({"turn": turn}, judge_sides=True) for turn in (0, 1))
+    assert (left["side_accuracy"], left["sides_judged"]) == (1.0, 1)
+    assert right["side_accuracy"] < 1.0 and right["mover_path_m"] > left["mover_path_m"] + 0.3
+    told = figures_of({"turn": 1, "told": 1}, judge_sides=True)
+    assert told["side_accuracy"] == 1.0 and told["mover_path_m"] == left["mover_path_m"]
+    alone = figures_of({"turn": 1, "told": 1})
+    assert alone["sides_judged"] == 0 and alone["side_accuracy"] is None
+    assert alone["mover_path_m"] == right["mover_path_m"]
+
+
+def test_a_robot_that_stands_at_its_goal_does_not_enter_figures_of_movers():
+    found = figures_of({"turn": 0}, limit_s=5.0)
+    assert found["arrival_rate"] == 0.5 and found["mover_arrival_rate"] == 0.0
+    assert np.isnan(found["mover_path_m"])
 
 
 def test_figures_without_a_value_are_null_in_the_file(tmp_path):

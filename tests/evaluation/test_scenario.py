@@ -85,6 +85,7 @@ def test_task_names_are_exact(name):
         ("limit_s", float("inf")),
         ("substeps", 0),
         ("record_scans", "maybe"),
+        ("judge_sides", "some"),
         ("radio", {"loss": 1.1}),
         ("noise", {"range_fraction": -0.1}),
         ("lidar", {"beams": 7}),

@@ -10,6 +10,8 @@ def test_the_published_sets():
     assert seed_set("tuning") == list(range(1000, 1060))
     assert seed_set("check") == list(range(1100, 1300))
     assert seed_set("playground") == list(range(2000, 2009))
+    assert seed_set("giwt-evaluation") == list(range(30000, 30500))
+    assert seed_set("giwt-tuning") == list(range(31000, 31200))
     assert all(len(one.purpose) > 10 for one in seed_sets().values())
 
 

@@ -8,6 +8,7 @@ from scipy import stats
 
 from swarmscope.evaluation.statistics import (
     bootstrap_mean,
+    bootstrap_ratio,
     normal_quantile,
     paired_difference,
     sign_flip_p,
@@ -96,3 +97,16 @@ def test_pairs_see_what_unpaired_data_hide() -> None:
     swapped = paired_difference(maps, maps + gain)
     assert swapped.estimate == pytest.approx(-result.estimate) and swapped.p_value == result.p_value
     assert paired_difference([1.0, 2.0, math.nan], [1.0, math.nan, 3.0]).used == 1
+
+
+def test_ratios_of_sums() -> None:
+    found = bootstrap_ratio([1.0, 2.0, 3.0], [2.0, 4.0, 6.0])
+    assert found == (0.5, 0.5, 0.5, 3)
+    wide = bootstrap_ratio([0.0, 3.0, 1.0, math.nan], [1.0, 5.0, 2.0, 9.0])
+    assert wide.estimate == 0.5 and wide.used == 3 and 0.0 <= wide.low < 0.5 < wide.high <= 0.6
+    assert wide == bootstrap_ratio([0.0, 3.0, 1.0, math.nan], [1.0, 5.0, 2.0, 9.0])
+    assert math.isnan(bootstrap_ratio([], []).estimate) and math.isnan(bootstrap_ratio([1.0], [0.0]).estimate)
+    one = bootstrap_ratio([1.0], [4.0])
+    assert one.estimate == 0.25 and math.isnan(one.low)
+    with pytest.raises(ValueError, match="as many"):
+        bootstrap_ratio([1.0], [1.0, 2.0])

@@ -19,7 +19,7 @@ from swarmscope.evaluation.experiment import load_experiment, shipped_experiment
 from swarmscope.evaluation.results import pooled_figures
 from swarmscope.evaluation.statistics import Interval, PairedDifference
 from swarmscope.evaluation.weight import WeightResult
-from swarmscope.viewing.report import markdown, publish, tables, words, write_report
+from swarmscope.viewing.report import figures, markdown, publish, tables, words, write_report
 from swarmscope.viewing.report.again import Again
 from swarmscope.viewing.report.blocks import Row, Table
 from swarmscope.viewing.report.cases import case_picture, case_table, strongest
@@ -159,6 +159,60 @@ def test_one_map_has_no_interval_and_no_maps_no_figure():
     assert math.isnan(figure_of(RUNS[:1], "path_redundancy").low)
     assert math.isnan(figure_of([], "arrival_rate").estimate)
     assert words.interval("spl", figure_of(RUNS[:1], "spl")) == ""
+
+
+GAP: dict[str, Any] = {
+    "planners": {name: {"planner": {"params": {"w_i": k}}} for k, name in enumerate(("Left", "Right", "Ours", "Told"))},
+    "order": [],
+    "targets": [],
+    "gap": {"worst": "Left", "best": "Told"},
+    "flow_time": "Right",
+    "figures": ["flow_time"],
+    "published": [
+        {"source": "A", "metric": "mover_path_m", "values": {"P": {"Left": 20.0, "Ours": 19.0, "Told": 15.0}}}
+    ],
+}
+GAP_RUNS = [
+    hand_made("P", name, seed, [length + seed, length])
+    for name, length in (("Left", 20.0), ("Right", 18.0), ("Ours", 16.0), ("Told", 12.0))
+    for seed in (0, 1)
+]
+
+
+def test_the_gap_table_says_what_share_is_closed_beside_the_published_one():
+    table = tables.gap_table(Material(experiment(**GAP), GAP_RUNS))
+    assert table is not None
+    rows = rows_of(table)
+    assert list(rows) == ["Right", "Ours", "Told"]
+    # (4 + 4 + 4 + 4) m of 81 m, and of the 32 m that Told saves
+    assert rows["Ours"][0].startswith("19.8 % | [19.5, 20.0] | closes 50.0 % [50.0, 50.0] | 4 robots, 2 maps")
+    assert rows["Ours"][0].endswith("published 5.0 %, closes 20 %")
+    assert "closes" not in rows["Told"][0] and rows["Told"][0].endswith("published 25.0 %")
+    assert rows["Ours"][1] == "not run"
+    assert tables.gap_table(Material(experiment(), RUNS)) is None
+
+
+def test_flow_times_are_drawn_and_their_means_said(tmp_path: Path):
+    material = Material(experiment(**GAP), GAP_RUNS)
+    with style():
+        found = figures.flow_time_picture(material)
+    assert found is not None
+    assert "Right in P 82.5 % (4 robots), Ours in P 62.5 % (4 robots)" in found.caption
+    assert figures.flow_time_picture(Material(experiment(), RUNS)) is None
+    write_report(experiment(**GAP), GAP_RUNS, tmp_path / "r")
+    page = (tmp_path / "r/report.html").read_text()
+    assert "Flow-time increase" in page and "worst: Left" in page
+
+
+def test_shares_of_movers_and_of_judged_choices_are_pooled():
+    counted = [{"movers": 10.0, "mover_arrival_rate": 0.9}, {"movers": 30.0, "mover_arrival_rate": 1.0}]
+    judged = [{"side_accuracy": 1.0, "sides_judged": 2.0}, {"side_accuracy": 0.5, "sides_judged": 6.0}]
+    runs = [hand_made("P", "Ours", k, [10.0], **(counted[k] | judged[k])) for k in range(2)]
+    arrived = figure_of(runs, "mover_arrival_rate")
+    assert arrived.estimate == pytest.approx(39 / 40) and arrived.used == 40 and arrived.high < 1.0
+    assert figure_of(runs, "side_accuracy")[:1] == (pytest.approx(5 / 8),)
+    nobody = [hand_made("P", "Ours", 0, [10.0], side_accuracy=None, sides_judged=0.0)]
+    assert math.isnan(figure_of(nobody, "side_accuracy").estimate)
 
 
 def test_failures_are_counted_and_named():

@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
+from swarmscope.errors import ConfigError, InputFileError
 from swarmscope.evaluation.engines import Engine
 from swarmscope.evaluation.experiment import Experiment, Unit, units
 from swarmscope.evaluation.scenario import Scenario, complete, planner_of
@@ -35,8 +36,14 @@ class State(NamedTuple):
 
 
 def keyed_units(experiment: Experiment, maps: int | None = None) -> list[Keyed]:
-    """Return every unit with its content key."""
-    return [(unit, unit_key(complete(unit.scenario))) for unit in units(experiment, maps)]
+    """Return every unit with its content key; a ConfigError names the planner whose network is not there."""
+    found: list[Keyed] = []
+    for unit in units(experiment, maps):
+        try:
+            found.append((unit, unit_key(complete(unit.scenario))))
+        except InputFileError as error:
+            raise ConfigError(f"{experiment.name}: planner '{unit.planner}'", f"has no model to run: {error}") from None
+    return found
 
 
 def state_of(experiment: Experiment, store: Store, maps: int | None = None) -> State:

@@ -74,8 +74,17 @@ class WeightEstimate(_Strict):
     seeds: str = "playground"
 
 
-FIGURES = ("boxes", "paths", "sweeps", "field", "cases", "weight", "resources")
-Figure = Literal["boxes", "paths", "sweeps", "field", "cases", "weight", "resources"]
+class Gap(_Strict):
+    """Two planners between whose path lengths the others are placed (GIWT 5.3)."""
+
+    worst: Name
+    """Reductions are counted from this one."""
+    best: Name
+    """The bound: this one closes the gap."""
+
+
+FIGURES = ("boxes", "paths", "sweeps", "field", "cases", "weight", "resources", "flow_time")
+Figure = Literal["boxes", "paths", "sweeps", "field", "cases", "weight", "resources", "flow_time"]
 
 
 class Experiment(_Strict):
@@ -100,6 +109,9 @@ class Experiment(_Strict):
     targets: list[Target] = []
     figures: list[Figure] = ["boxes", "paths"]
     weight: WeightEstimate | None = None
+    gap: Gap | None = None
+    flow_time: Name | None = None
+    """Planner whose flow-time increases stand beside those of 'ours' (figure ``flow_time``)."""
     notes: list[str] = []
     """Sentences that the report shows under its tables: known differences to the publication."""
 
@@ -115,6 +127,13 @@ class Experiment(_Strict):
         if self.weight is not None:
             _known("planner", self.weight.planner, self.planners, "weight")
             _known("place", self.weight.place, self.places, "weight")
+        if self.gap is not None:
+            _known("planner", self.gap.worst, self.planners, "gap")
+            _known("planner", self.gap.best, self.planners, "gap")
+            if self.gap.worst == self.gap.best:
+                raise ValueError("gap: 'worst' and 'best' are the same planner")
+        if self.flow_time is not None:
+            _known("planner", self.flow_time, self.planners, "flow_time")
         named = [*self.metrics, *(p.metric for p in self.published), *(t.metric for t in self.targets)]
         for metric in named:
             _known("metric", metric, [m.name for m in (*METRICS, *COUNTED)], "metrics")
@@ -238,6 +257,7 @@ def _first_problem(error: ValidationError, where: str) -> ConfigError:
     if problem["type"] == "extra_forbidden":
         kinds: dict[str, type[BaseModel]] = {
             "sweeps": Sweep, "published": Published, "targets": Target, "weight": WeightEstimate,
+            "gap": Gap,
         }  # fmt: skip
         model = kinds.get(str(problem["loc"][0]), Experiment) if len(problem["loc"]) > 1 else Experiment
         message = f"unknown key{nearest_hint(str(problem['loc'][-1]), model.model_fields)}"

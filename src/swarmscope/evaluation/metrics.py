@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-AT_GOAL_M = 0.1  # who starts no farther from its goal has nowhere to go
 STANDING_MPS = 0.02  # a robot slower than this waits
 
 
@@ -46,10 +45,11 @@ METRICS: list[Metric] = [
 ]
 COUNTED: list[Metric] = [
     Metric("path_stretch_any_angle", "", "lower", "sum(l) / sum of the true shortest ways, robots that arrived"),
-    Metric("mover_path_m", "m", "lower", "mean length travelled by robots that had somewhere to go and arrived"),
-    Metric("mover_arrival_rate", "", "higher", "share of robots that had somewhere to go and arrived"),
-    Metric("side_accuracy", "", "higher", "share of choices on the side of the shortest way (with judge_sides)"),
-    Metric("sides_judged", "", "neither", "choices where the shortest way has a side"),
+    Metric("mover_path_m", "m", "lower", "mean length travelled by robots that had to move and arrived (APL)"),
+    Metric("mover_arrival_rate", "", "higher", "share of robots that had to move that arrived (SR)"),
+    Metric("movers", "", "neither", "robots that start away from their goals"),
+    Metric("side_accuracy", "", "higher", "share of judged choices that took the side of the shortest way (Acc)"),
+    Metric("sides_judged", "", "neither", "choices of a side where the shortest way has one, all robots"),
     Metric("planning_failures", "", "lower", "robots that did not arrive in time (N_a)"),
     Metric("collisions", "", "lower", "robots that touched something"),
     Metric("min_clearance_m", "m", "higher", "smallest distance of any robot to anything"),
@@ -140,6 +140,35 @@ def average_path_length_m(travelled_m: Floats, arrival_s: Floats) -> float:
     return _mean(travelled_m[arrived(arrival_s)])
 
 
+def movers(starts_m: Floats, goals_m: Floats, arrive_m: float) -> Bools:
+    """Say of each robot (N,) whether it starts farther than ``arrive_m`` from its goal.
+
+    ``starts_m`` are (N, 2 or 3), ``goals_m`` (N, 2) [m].
+    """
+    away: Bools = np.hypot(*(goals_m[:, :2] - starts_m[:, :2]).T) > arrive_m
+    return away
+
+
+def mover_path_m(travelled_m: Floats, arrival_s: Floats, moves: Bools) -> float:
+    """Return the mean length [m] of the ways of robots that had to move and arrived (APL of GIWT, Table II)."""
+    return _mean(travelled_m[moves & arrived(arrival_s)])
+
+
+def mover_arrival_rate(arrival_s: Floats, moves: Bools) -> float:
+    """Return the share of robots that had to move that arrived (SR of GIWT, Table II)."""
+    return _mean(arrived(arrival_s)[moves])
+
+
+def sides_judged(told_side: NDArray[np.integer]) -> int:
+    """Return how many choices (C,) have a side of the shortest way: ``told_side`` +1 left, -1 right, 0 none."""
+    return int(np.count_nonzero(told_side))
+
+
+def side_accuracy(side: NDArray[np.integer], told_side: NDArray[np.integer]) -> float:
+    """Return the share of judged choices that took the side of the shortest way (Acc of GIWT, Table II)."""
+    return _mean((side == told_side)[told_side != 0])
+
+
 def duration_s(arrival_s: Floats) -> float:
     """Return the time [s] of the last arrival (t of Nav-SCOPE), NaN when nobody arrived."""
     return (
@@ -213,18 +242,6 @@ def all_metrics(
         "bytes_per_robot_s": bytes_per_robot_s(bytes_sent, t_s, arrival_s),
     }
     return {metric.name: values[metric.name] for metric in METRICS}
-
-
-def had_to_move(starts: Floats, goals: Floats) -> Bools:
-    """Say (N,) which robots start farther than AT_GOAL_M from their goals; starts (N, 2+), goals (N, 2) [m]."""
-    apart = np.asarray(goals) - np.asarray(starts)[:, :2]
-    return np.asarray(np.hypot(apart[:, 0], apart[:, 1]) > AT_GOAL_M)
-
-
-def side_accuracy(side: NDArray[np.integer], told_side: NDArray[np.integer]) -> float:
-    """Return the share of choices ``side (K,)`` that are the expert's, of those where ``told_side (K,)`` is not 0."""
-    judged = told_side != 0
-    return _ratio(float((side[judged] == told_side[judged]).sum()), float(judged.sum()))
 
 
 def _under_way(t_s: Floats, arrival_s: Floats) -> Bools:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarmscope.evaluation import metrics
-from swarmscope.evaluation.statistics import PairedDifference, paired_difference
+from swarmscope.evaluation.statistics import Interval, PairedDifference, bootstrap_ratio, paired_difference
 
 Floats = NDArray[np.float64]
 
@@ -74,6 +74,49 @@ def paired(ours: list[Run], others: list[Run], metric: str) -> PairedDifference:
     theirs = {run.seed: run.figures.get(metric) for run in others}
     seeds = [s for s in sorted(mine.keys() & theirs.keys()) if mine[s] is not None and theirs[s] is not None]
     return paired_difference([mine[s] for s in seeds], [theirs[s] for s in seeds])  # type: ignore[arg-type]
+
+
+class PathGap(NamedTuple):
+    """How much shorter a planner's ways are, robot by robot, with bootstrap intervals over the maps."""
+
+    reduction: Interval
+    """1 - sum(l) / sum(l_worst), over robots that arrived with both planners."""
+    closed: Interval
+    """sum(l_worst - l) / sum(l_worst - l_best), over robots that arrived with all three."""
+    robots: int
+    """Robots that entered the reduction and moved."""
+
+
+def path_gap(runs: list[Run], worst: list[Run], best: list[Run]) -> PathGap:
+    """Return where the path lengths of ``runs`` lie between those of ``worst`` and ``best`` in the same worlds."""
+    far, near = {run.seed: run for run in worst}, {run.seed: run for run in best}
+    shorter, longest, gained, whole, robots = [], [], [], [], 0
+    for run in (run for run in runs if run.seed in far):
+        other = far[run.seed]
+        both = np.isfinite(run.arrival_s) & np.isfinite(other.arrival_s)
+        saved = other.travelled_m - run.travelled_m
+        robots += int(np.count_nonzero(other.travelled_m[both]))
+        if other.travelled_m[both].any():
+            shorter.append(saved[both].sum())
+            longest.append(other.travelled_m[both].sum())
+        if run.seed in near:
+            bound = near[run.seed]
+            every = both & np.isfinite(bound.arrival_s)
+            if other.travelled_m[every].any():
+                gained.append(saved[every].sum())
+                whole.append((other.travelled_m - bound.travelled_m)[every].sum())
+    return PathGap(bootstrap_ratio(shorter, longest), bootstrap_ratio(gained, whole), robots)
+
+
+def flow_time_increases(runs: Iterable[Run]) -> Floats:
+    """Return FT = (l - l*) / l* of every robot that arrived and had a way to go (GIWT 5.3), l* by A*."""
+    every = list(runs)
+    travelled = np.concatenate([run.travelled_m for run in every] or [np.zeros(0)])
+    shortest = np.concatenate([run.shortest_m for run in every] or [np.zeros(0)])
+    arrival = np.concatenate([run.arrival_s for run in every] or [np.zeros(0)])
+    chosen = np.isfinite(arrival) & (shortest > 0.0)
+    increases: Floats = travelled[chosen] / shortest[chosen] - 1.0
+    return increases
 
 
 class TimeBudget(NamedTuple):

@@ -14,12 +14,13 @@ import numpy as np
 
 from swarmscope.evaluation.metrics import (
     all_metrics,
-    arrival_rate,
-    average_path_length_m,
-    had_to_move,
+    mover_arrival_rate,
+    mover_path_m,
+    movers,
     path_lengths,
     path_stretch,
     side_accuracy,
+    sides_judged,
 )
 from swarmscope.evaluation.provenance import git_revision, versions
 from swarmscope.evaluation.run_folder import check_out, write_run
@@ -32,6 +33,8 @@ from swarmscope.tasks import Setup
 
 ANY_ANGLE_ROBOTS = 50
 """With more robots the any-angle reference, which takes longer than the run, is left out."""
+ARRIVE_M = 0.05
+"""Distance to the goal at which robots have arrived whose planner has no parameter ``arrive_m``."""
 KILO = 1000.0
 SEARCHED_M2 = 1e6
 """Sum of (start to goal)^2 over the robots that get an A* reference: some 5 s of search."""
@@ -68,8 +71,8 @@ def play(
 ) -> Outcome:
     """Run the scenario and find the reference ways; ``progress(simulated seconds, robots done)``.
 
-    ``references`` of the same world are taken as they are. Planners that declare ``TOLD_SIDE`` are told the side of
-    the shortest way; the scenario's ``judge_sides`` notes it beside every choice of the others.
+    ``references`` of the same world are taken as they are. The side of the shortest way is found for planners that
+    declare ``TOLD_SIDE``, and where the scenario says ``judge_sides``: then it is noted beside every choice.
     """
     setup = make_setup(scenario)
     setting = make_setting(scenario, setup, threads)
@@ -137,21 +140,20 @@ def figures(outcome: Outcome) -> dict[str, Any]:
             outcome.references.shortest_m,
         )
     )
-    stretch = path_stretch(
-        path_lengths(x, y, t_s, robots["arrival_s"]), outcome.references.any_angle_m, robots["arrival_s"]
-    )
+    travelled = path_lengths(x, y, t_s, robots["arrival_s"])
+    stretch = path_stretch(travelled, outcome.references.any_angle_m, robots["arrival_s"])
+    arrive_m = float(getattr(outcome.setting.params, "arrive_m", ARRIVE_M))
+    moved = movers(outcome.setup.starts, outcome.setup.goals, arrive_m)
+    sides, told = trace.choices["side"], trace.choices["told_side"]
     simulated = len(trace.t_s) * outcome.setting.dt
     features = int(robots["sent_features"].sum())
-    movers = had_to_move(outcome.setup.starts, outcome.setup.goals)
-    travelled = path_lengths(x, y, t_s, robots["arrival_s"])
-    choices = trace.choices
-    judged = int((choices["told_side"] != 0).sum())
     values |= {
-        "mover_path_m": average_path_length_m(travelled[movers], robots["arrival_s"][movers]),
-        "mover_arrival_rate": arrival_rate(robots["arrival_s"][movers]),
-        "side_accuracy": side_accuracy(choices["side"], choices["told_side"]) if judged else None,
-        "sides_judged": judged,
         "path_stretch_any_angle": stretch,
+        "mover_path_m": mover_path_m(travelled, robots["arrival_s"], moved),
+        "mover_arrival_rate": mover_arrival_rate(robots["arrival_s"], moved),
+        "movers": int(moved.sum()),
+        "side_accuracy": side_accuracy(sides, told) if told.any() else None,
+        "sides_judged": sides_judged(told),
         "reference_robots": int(np.isfinite(outcome.references.shortest_m).sum()),
         "planning_failures": int((~np.isfinite(robots["arrival_s"])).sum()),
         "collisions": int(robots["crashed"].sum()),

@@ -143,7 +143,7 @@ class Scenario(_Strict):
     substeps: Annotated[int, Field(ge=1, le=1000)] = 20
     record_scans: Literal["auto", "yes", "no"] = "auto"
     judge_sides: bool = False
-    """Note beside every choice the side of the shortest way; who takes advice (dh-bug with told = 1) gets it."""
+    """Note the side of the shortest way beside every choice; planners with ``told`` set take it."""
 
     @model_validator(mode="after")
     def _one_place(self) -> Self:

@@ -56,6 +56,33 @@ def bootstrap_mean(
     return Interval(float(np.mean(data)), float(low), float(high), len(data))
 
 
+def bootstrap_ratio(
+    above: ArrayLike, below: ArrayLike, confidence: float = 0.95, seed: int = 0, resamples: int = RESAMPLES
+) -> Interval:
+    """Return sum(``above``) / sum(``below``) with its percentile bootstrap interval over the pairs of both.
+
+    NaN where the sum below is 0; draws in which it is are left out of the interval.
+    """
+    _check_confidence(confidence)
+    a, b = np.asarray(above, dtype=np.float64).ravel(), np.asarray(below, dtype=np.float64).ravel()
+    if a.shape != b.shape:
+        raise ValueError(f"a ratio needs as many values above as below, not {len(a)} and {len(b)}")
+    known = np.isfinite(a) & np.isfinite(b)
+    a, b = a[known], b[known]
+    if len(a) == 0 or b.sum() == 0.0:
+        return Interval(math.nan, math.nan, math.nan, len(a))
+    estimate = float(a.sum() / b.sum())
+    if len(a) == 1:
+        return Interval(estimate, math.nan, math.nan, 1)
+    rng, ratios = np.random.default_rng(seed), list[Floats]()
+    for rows in _blocks(resamples, len(a)):
+        drawn = rng.integers(0, len(a), size=(rows, len(a)))
+        sums = b[drawn].sum(axis=1)
+        ratios.append(a[drawn].sum(axis=1)[sums != 0.0] / sums[sums != 0.0])
+    low, high = np.quantile(np.concatenate(ratios), [0.5 - 0.5 * confidence, 0.5 + 0.5 * confidence])
+    return Interval(estimate, float(low), float(high), len(a))
+
+
 def wilson(successes: int, trials: int, confidence: float = 0.95) -> Interval:
     """Return the share of successes with Wilson's score interval (Wilson 1927); it stays within [0, 1]."""
     _check_confidence(confidence)

@@ -68,8 +68,8 @@ def estimate_weight(experiment: Experiment) -> WeightResult:
     seeds = seed_set(asked.seeds)
     counts = []
     for seed in seeds:
-        scenario = parse_scenario(keys | {"seed": seed, "record_scans": "no"}, "weight")
-        outcome = play(scenario.model_copy(update={"judge_sides": True}), any_angle=False)
+        scenario = parse_scenario(keys | {"seed": seed, "record_scans": "no", "judge_sides": True}, "weight")
+        outcome = play(scenario, any_angle=False)
         counts.append(count_errors(outcome.trace.choices))
     protection = outcome.setting.rig.protection
     return weight_of(np.array(counts), protection.sigma_a, seeds)

@@ -27,6 +27,7 @@ REDRAWS = 200
 """Of one obstacle; after so many it is left out."""
 
 Floats = NDArray[np.float64]
+Range = tuple[float, float]
 Kind = Literal["A", "B", "C"]
 
 
@@ -46,8 +47,8 @@ def draw_map(rng: np.random.Generator, options: MapOptions, keep_free: Floats, f
     obstacles: list[Obstacle] = []
     for _ in range(int(rng.integers(int(options.fewest), int(options.most) + 1))):
         for _ in range(REDRAWS):
-            one = _draw_obstacle(rng, options)
-            if _stays_off(one, keep_free, free_m):
+            one = draw_obstacle(rng, options.obstacles, (options.size_m, options.size_m), SIDE_M, RADIUS_M)
+            if stays_off(one, keep_free, free_m):
                 obstacles.append(one)
                 break
     return walled(obstacles, options.size_m)
@@ -60,21 +61,21 @@ def walled(obstacles: Sequence[Obstacle], size: float) -> WorldSpec:
     return WorldSpec.model_construct(obstacles=[*closed_room(0.0, 0.0, size, size), *obstacles], bounds=bounds)
 
 
-def _draw_obstacle(rng: np.random.Generator, options: MapOptions) -> Obstacle:
-    kind = options.obstacles
+def draw_obstacle(rng: np.random.Generator, kind: Kind, floor: Range, side: Range, radius: Range) -> Obstacle:
+    """Return a rectangle (A) or a cylinder (B), or one of both (C), with its centre on ``floor`` (x, y) [m]."""
     if kind == "C":
         kind = "A" if rng.random() < 0.5 else "B"
-    x, y = (float(v) for v in rng.uniform(0.0, options.size_m, 2))
+    x, y = (float(v) for v in rng.uniform(0.0, floor, 2))
     if kind == "B":
-        return Circle.model_construct(type="circle", center=(x, y), radius=float(rng.uniform(*RADIUS_M)))
-    a, b = 0.5 * rng.uniform(*SIDE_M, 2)
+        return Circle.model_construct(type="circle", center=(x, y), radius=float(rng.uniform(*radius)))
+    a, b = 0.5 * rng.uniform(*side, 2)
     yaw = rng.uniform(0.0, math.pi)
     c, s = math.cos(yaw), math.sin(yaw)
     corners = [(x + c * u - s * v, y + s * u + c * v) for u, v in ((a, b), (-a, b), (-a, -b), (a, -b))]
     return Polygon.model_construct(type="polygon", points=[(float(px), float(py)) for px, py in corners])
 
 
-def _stays_off(obstacle: Obstacle, points: Floats, distance: float) -> bool:
+def stays_off(obstacle: Obstacle, points: Floats, distance: float) -> bool:
     """Tell whether no point is in the obstacle or closer to it than ``distance``."""
     if not len(points):
         return True

@@ -38,6 +38,7 @@ HEADINGS = {
     "cases": "Convergence and divergence",
     "weight": "Weight of the neighbours, from data",
     "resources": "Computation and communication",
+    "flow_time": "Flow-time increase",
 }
 MOST_NAMED = 12
 """More failures than this are folded away."""
@@ -136,7 +137,8 @@ def _results(material: Material) -> list[Block]:
 
 def _differences(material: Material) -> list[Block]:
     found = [tables.paired_table(material, metric) for metric in material.experiment.metrics]
-    shown = [table for table in found if table is not None]
+    gap = tables.gap_table(material)
+    shown = [table for table in [*found, gap] if table is not None]
     if not shown:
         return []
     intro = (
@@ -170,6 +172,7 @@ def _figures(material: Material, progress: Progress) -> list[Block]:
         "field": lambda: [figures.field_picture(material)],
         "cases": lambda: case_blocks(material, again, progress) if material.of(ALL, material.leading()) else [],
         "weight": lambda: [tables.weight_table(material.weight)] if material.weight is not None else [],
+        "flow_time": lambda: _or_nothing(figures.flow_time_picture(material)),
         "resources": lambda: [tables.resource_table(material)] if material.main_runs() else [],
     }
     again, blocks = Again(), list[Block]()

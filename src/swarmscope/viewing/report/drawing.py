@@ -39,6 +39,8 @@ DARK = {
     "#7a6fb0": "#a79be0",
     "#8c6d1f": "#c9a545",
     "#6c757d": "#9aa5ae",
+    "#a3475c": "#d98095",
+    "#4f7a28": "#8dbb62",
 }
 """What a colour becomes on a dark page; others stay."""
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from swarmscope.errors import SwarmscopeError
 from swarmscope.evaluation.experiment import Sweep, merged, sweep_label
-from swarmscope.evaluation.results import Run
+from swarmscope.evaluation.results import Run, flow_time_increases
 from swarmscope.evaluation.scenario import RobotModel
 from swarmscope.onboard.planning._contract import load_planner
 from swarmscope.onboard.planning.fields import interaction_force
@@ -18,12 +18,14 @@ from swarmscope.viewing.pictures import FAINT, INK
 from swarmscope.viewing.report import words
 from swarmscope.viewing.report.blocks import Picture
 from swarmscope.viewing.report.drawing import PAPER, new_figure, note_grid, picture, symbols
-from swarmscope.viewing.report.material import OURS_COLOUR, Material
+from swarmscope.viewing.report.material import ALL, OURS_COLOUR, Material
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 ESTIMATE = "#009e73"
+FLOW_STEP = 10.0
+"""Width of a bin of flow-time increases [%]."""
 BOXED = ("path_redundancy", "spl", "duration_s")
 
 
@@ -197,6 +199,41 @@ def _defaults(material: Material, planner: str) -> dict[str, float]:
     except SwarmscopeError:
         return {}
     return dict(module.Params._field_defaults)
+
+
+def flow_time_picture(material: Material) -> Picture | None:
+    """Return histograms of (l - l*) / l* of ours and of the experiment's other planner, by place (GIWT Fig. 7)."""
+    ours, other = material.experiment.ours, material.experiment.flow_time
+    if ours is None or other is None or not any(material.of(ALL, name) for name in (ours, other)):
+        return None
+    figure = new_figure(8.2, 2.9)
+    panels = figure.subplots(1, len(material.places), squeeze=False)[0]
+    cases = []
+    for axes, place in zip(panels, material.places, strict=True):
+        found = {name: 100.0 * flow_time_increases(material.of(place, name)) for name in (other, ours)}
+        every = np.concatenate(list(found.values()))
+        top = FLOW_STEP * math.ceil(max(100.0, float(np.percentile(every, 98)) if len(every) else 0.0) / FLOW_STEP)
+        edges = np.arange(-FLOW_STEP, top + 0.5 * FLOW_STEP, FLOW_STEP)
+        for name, values in found.items():
+            if not len(values):
+                continue
+            share = np.full(len(values), 100.0 / len(values))
+            colour, held = material.colour(name), np.minimum(values, top - 1e-6)
+            axes.hist(held, edges, weights=share, color=colour, alpha=0.28, histtype="stepfilled")
+            axes.hist(held, edges, weights=share, color=colour, lw=1.4, histtype="step", label=name)
+            axes.axvline(float(values.mean()), color=colour, lw=1.2, ls=(0, (4, 3)))
+            cases.append(f"{name} in {place} {values.mean():.1f} % ({words.count(len(values), 'robot')})")
+        axes.set_title(place, loc="left")
+        axes.set_xlabel("flow-time increase [%]")
+        note_grid(axes)
+    panels[0].set_ylabel("share of robots [%]")
+    handles, labels = next((h for axes in panels if (h := axes.get_legend_handles_labels())[0]), ([], []))
+    figure.legend(handles, labels, loc="outside upper left", ncols=2)
+    caption = (
+        f"Flow-time increase (l − l*) / l* of robots that arrived, {ours} and {other}; l*: the shortest way by A*. "
+        f"What is beyond the last bin is in it. Dashed: means, {', '.join(cases)}."
+    )
+    return picture(figure, "flow_time", caption, f"Flow-time increase of {ours} and {other}")
 
 
 def field_picture(material: Material) -> Picture:

@@ -9,8 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarmscope.evaluation.experiment import Experiment, merged
-from swarmscope.evaluation.results import Run, grouped, paired, pooled_figures, values_of
-from swarmscope.evaluation.statistics import RESAMPLES, Interval, PairedDifference, bootstrap_mean, wilson
+from swarmscope.evaluation.results import PathGap, Run, grouped, paired, path_gap, pooled_figures, values_of
+from swarmscope.evaluation.statistics import (
+    RESAMPLES,
+    Interval,
+    PairedDifference,
+    bootstrap_mean,
+    bootstrap_ratio,
+    wilson,
+)
 from swarmscope.evaluation.weight import WeightResult
 
 Floats = NDArray[np.float64]
@@ -19,7 +26,7 @@ ALL = "all"
 """Stands for all places together."""
 POOLED = ("path_redundancy", "path_redundancy_all", "path_stretch", "spl")
 OURS_COLOUR = "#0072b2"
-COLOURS = ("#e69f00", "#009e73", "#cc79a7", "#7a6fb0", "#8c6d1f", "#d55e00", "#56b4e9", "#6c757d")
+COLOURS = ("#e69f00", "#009e73", "#cc79a7", "#7a6fb0", "#8c6d1f", "#d55e00", "#56b4e9", "#6c757d", "#a3475c", "#4f7a28")
 """Okabe and Ito's palette with additions: told apart by colour-blind readers."""
 
 
@@ -58,6 +65,13 @@ class Material:
     def paired(self, place: str, first: str, second: str, metric: str) -> PairedDifference:
         """Return the mean difference first - second over the maps that both have a figure on."""
         return paired(self.of(place, first), self.of(place, second), metric)
+
+    def gap(self, place: str, planner: str) -> PathGap | None:
+        """Return where the planner's path lengths lie between the experiment's two; None where these were not run."""
+        asked = self.experiment.gap
+        if asked is None or not all(self.of(place, name) for name in (planner, asked.worst, asked.best)):
+            return None
+        return path_gap(*(self.of(place, name) for name in (planner, asked.worst, asked.best)))
 
     def published(self, metric: str, place: str, planner: str) -> float | None:
         """Return the published value, if there is one."""
@@ -107,6 +121,13 @@ def figure_of(runs: list[Run], metric: str) -> Interval:
     if metric == "arrival_rate":
         robots = sum(len(run.arrival_s) for run in runs)
         return wilson(sum(int(np.isfinite(run.arrival_s).sum()) for run in runs), robots)
+    if metric == "mover_arrival_rate":
+        movers, rates = values_of(runs, "movers"), values_of(runs, metric)
+        there = np.isfinite(movers * rates)
+        return wilson(round(float((movers * rates)[there].sum())), int(movers[there].sum()))
+    if metric == "side_accuracy":
+        judged = values_of(runs, "sides_judged")
+        return bootstrap_ratio(values_of(runs, metric) * judged, judged)
     if metric in POOLED:
         return pooled_interval(runs, metric)
     return bootstrap_mean(values_of(runs, metric))

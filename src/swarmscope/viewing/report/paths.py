@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 MANY = 60
 """With more robots than this their lines are thinner."""
+MANY_PLANNERS = 6
+"""With more planners than this their names stand above the figures of their runs."""
 
 
 def median_seed(material: Material) -> int | None:
@@ -58,7 +60,8 @@ def path_picture(material: Material, again: Again, progress: Callable[[str], Non
             if axes is row[0]:
                 axes.set_ylabel(place, fontsize=11, rotation=0, ha="right", va="center", labelpad=8)
             if k == 0:
-                axes.set_title(planner, loc="left", fontsize=10.5, fontweight="bold", color=material.colour(planner))
+                name = f"{planner}\n" if len(planners) > MANY_PLANNERS else planner
+                axes.set_title(name, loc="left", fontsize=10.5, fontweight="bold", color=material.colour(planner))
     lost = sum(int(np.sum(~p.arrived)) for p in played.values())
     caption = (
         f"Paths of all robots, seed {seed}: rows are places, columns planners, every row one world. It is the seed "

@@ -7,17 +7,19 @@ from typing import NamedTuple
 
 from swarmscope.errors import UnknownNameError
 from swarmscope.evaluation.results import Run, TimeBudget, time_budget
-from swarmscope.evaluation.statistics import PairedDifference
+from swarmscope.evaluation.statistics import Interval, PairedDifference
 from swarmscope.evaluation.weight import NEIGHBOUR_PRINTED, SELF_PRINTED, WEIGHT_PRINTED, WeightResult
 from swarmscope.onboard.planning._contract import load_planner
 from swarmscope.viewing.report import words
-from swarmscope.viewing.report.blocks import Line, Row, Table, Value, cell
+from swarmscope.viewing.report.blocks import Line, Mark, Row, Table, Value, cell
 from swarmscope.viewing.report.material import ALL, Material
 
 RESOURCES = (
     "plan_us_p50", "plan_us_p99", "planner_memory_bytes", "bandwidth_kbps", "mean_package_bytes", "bytes_on_air",
 )  # fmt: skip
 NOT_RUN = "not run"
+GAP_METRIC = "mover_path_m"
+"""The figure whose published values a gap is compared with."""
 
 
 class Paired(NamedTuple):
@@ -115,6 +117,57 @@ def _difference(metric: str, entry: Paired | None) -> Value:
     maps = words.count(entry.found.used, "map")
     lines = cell(words.difference(metric, entry.found.estimate), words.interval(metric, entry.found, True))
     return [*lines, Line(f"{chance}, {maps}", "sub"), Line(verdict.words, "sub", verdict.mark)]
+
+
+def gap_table(material: Material) -> Table | None:
+    """Return how much shorter ways are than those of the gap's worst planner, and the share of it that is closed."""
+    asked = material.experiment.gap
+    if asked is None:
+        return None
+    others = [planner for planner in material.planners if planner != asked.worst]
+    places = material.places
+    if not any(material.gap(place, planner) for planner in others for place in places):
+        return None
+    rows = [_row(material, planner, [_gap(material, place, planner) for place in places]) for planner in others]
+    caption = (
+        f"Ways of robots that arrived with both planners: how much shorter than with {asked.worst}; of robots that "
+        f"also arrived with {asked.best}: the share of the gap between {asked.worst} and {asked.best} that is closed."
+    )
+    published = any(material.published(GAP_METRIC, place, asked.worst) for place in places)
+    note = "Published values follow from the published mean path lengths." if published else ""
+    return Table(caption, ["", *places], rows, note)
+
+
+def _gap(material: Material, place: str, planner: str) -> Value:
+    asked, found = material.experiment.gap, material.gap(place, planner)
+    if asked is None or found is None:
+        return [Line(NOT_RUN, "plain")]
+    if found.reduction.used == 0:
+        return [Line("no robot in common", "plain")]
+    lines = cell(_share(found.reduction), _shares(found.reduction))
+    if planner != asked.best:
+        lines.append(Line(f"closes {_share(found.closed)} {_shares(found.closed)}".rstrip(), "sub"))
+    entered = f"{words.count(found.robots, 'robot')}, {words.count(found.reduction.used, 'map')}"
+    lines.append(Line(entered, "sub"))
+    ours, worst, best = (material.published(GAP_METRIC, place, name) for name in (planner, asked.worst, asked.best))
+    if ours is None or worst is None:
+        return lines
+    printed = 1.0 - ours / worst
+    text = f"published {100.0 * printed:.1f} %"
+    if best is not None and planner != asked.best:
+        text += f", closes {100.0 * (worst - ours) / (worst - best):.0f} %"
+    outside = not found.reduction.low <= printed <= found.reduction.high and math.isfinite(found.reduction.low)
+    mark: Mark = "" if not outside else "good" if found.reduction.estimate > printed else "bad"
+    return [*lines, Line(text.replace("-", "−"), "sub", mark)]
+
+
+def _share(found: Interval) -> str:
+    return f"{100.0 * found.estimate:.1f} %".replace("-", "−") if math.isfinite(found.estimate) else words.MISSING
+
+
+def _shares(found: Interval) -> str:
+    bounds = f"[{100.0 * found.low:.1f}, {100.0 * found.high:.1f}]".replace("-", "−")
+    return bounds if math.isfinite(found.low) else ""
 
 
 def failure_table(material: Material) -> Table:

@@ -31,7 +31,7 @@ TITLES = {
     "mover_path_m": "Path length APL",
     "mover_arrival_rate": "Success rate SR",
     "side_accuracy": "Accuracy of sides Acc",
-    "sides_judged": "Sides judged",
+    "sides_judged": "Choices judged",
     "planning_failures": "Planning failures N_a",
     "fusions": "Fusions N_u",
     "bandwidth_kbps": "Bandwidth",
@@ -43,8 +43,8 @@ TITLES = {
 }
 SHARES = frozenset(
     {
-        "arrival_rate", "collision_rate", "path_redundancy", "path_redundancy_all", "spl",
-        "mover_arrival_rate", "side_accuracy",
+        "arrival_rate", "collision_rate", "path_redundancy", "path_redundancy_all", "spl", "mover_arrival_rate",
+        "side_accuracy",
     }
 )  # fmt: skip
 RATIOS = frozenset({"path_stretch", "path_stretch_any_angle"})
@@ -54,7 +54,8 @@ SUMMARIES = {
     "path_stretch": "Σl / Σl*, sums over the robots that arrived",
     "path_stretch_any_angle": "Σl over the sum of the true shortest ways, robots that arrived",
 }
-DECIMAL = frozenset({"s"})
+DECIMAL = {"s": 1, "m": 2}
+"""Digits after the point."""
 STEPS = {"B": ("B", "kB", "MB", "GB"), "us": ("µs", "ms", "s")}
 
 
@@ -96,7 +97,7 @@ def value(metric: str, number: float | None) -> str:
         scaled, unit = _scaled(number, STEPS[unit])
         return f"{_digits(scaled)} {unit}"
     if unit in DECIMAL:
-        return f"{_fixed(number, 1)} {unit}"
+        return f"{_fixed(number, DECIMAL[unit])} {unit}"
     return f"{_digits(number)} {unit}".strip()
 
 
@@ -240,7 +241,8 @@ def _size(metric: str, number: float, smallest: bool = False) -> str:
     if unit in STEPS:
         scaled, unit = _scaled(number, STEPS[unit])
         return f"{_digits(scaled)} {unit}"
-    return f"{_fixed(0.1 if smallest else number, 1)} {unit}".strip()
+    digits = DECIMAL.get(unit, 1)
+    return f"{_fixed(0.1**digits if smallest else number, digits)} {unit}".strip()
 
 
 def _nought(size: str) -> bool:
