@@ -41,6 +41,8 @@ CASES = 4
 RAGGED_M = 1.0
 COLUMN_M = (0.7, 11.0)
 """Where a column can be."""
+KEY_DEG = 60.0
+"""Where driven robots have to choose, as planner ``giwt`` has it."""
 LIMIT_S = 90.0
 """Length of a driven run."""
 TRIES = 3000
@@ -173,7 +175,7 @@ def _driven(rng: np.random.Generator, options: MapOptions, task: str, counts: Co
         return
     recorder = Recorder(rig)
     seed, turn = int(rng.integers(2**31)), int(rng.choice([dh_bug.TURN_RANDOM, dh_bug.TURN_NEAREST]))
-    params = dh_bug.Params(turn=turn, seed=int(rng.integers(2**31)))
+    params = dh_bug.Params(turn=turn, seed=int(rng.integers(2**31)), sector=0, key_deg=KEY_DEG)
     setting = make_setting(scenario, setup)
     setting = replace(setting, planner=recorder, record_scans=False, seed=seed, params=params)
     trace = run(setting)

@@ -53,7 +53,7 @@ from swarmscope.onboard.planning._giwt_network import (
     load_network,
     read_card,
 )
-from swarmscope.onboard.planning.dh_bug import AT_GOAL, GAP_RULE, KEY_POINT, PRINTED_RULE, toss
+from swarmscope.onboard.planning.dh_bug import AT_GOAL, GAP_RULE, KEY_POINT, toss
 from swarmscope.onboard.sharing.inbox import answer_directed, ask_direction, start_round, waiting_for_answers
 from swarmscope.onboard.sharing.message import direction_of, read_latent
 from swarmscope.onboard.tick import begin, finish
@@ -67,7 +67,7 @@ class Params(NamedTuple):
 
     seed: int = 0
     """Of the side that is tossed for after a loop, together with the robot's address and the number of its choices."""
-    key_deg: float = 80.0
+    key_deg: float = 60.0
     """pi/2 - theta_1: with no safe direction this close to the goal's there is a key point."""
     face_deg: float = 10.0
     """theta_0: with less than this to turn, mode A becomes B."""
@@ -103,7 +103,7 @@ Driving = dh_bug.Params
 def _driving(params: Params) -> Driving:
     """Return what DH-Bug's kernels are told."""
     return Driving(
-        dh_bug.TURN_RANDOM, params.seed, 0, params.key_deg, params.face_deg, params.turn_back_deg,
+        dh_bug.TURN_RANDOM, params.seed, 0, 0, params.key_deg, params.face_deg, params.turn_back_deg,
         params.arrive_m, params.creep, params.still_s, params.wait_m, params.wait_s,
     )  # fmt: skip
 
@@ -417,7 +417,7 @@ def key_point_near(
     for n in range(sensor.beams):
         nearer[n] = max(sensor.range_min, work[n] - way) if work[n] >= sensor.range_min else work[n]
     safe_directions(
-        nearer, sensor.range_min, sensor.range_max, sensor.wraps, rig.reach[PRINTED_RULE], edges, safe
+        nearer, sensor.range_min, sensor.range_max, sensor.wraps, rig.reach[GAP_RULE], edges, safe
     )
     turn = min(turn_to_safe(percept, safe, 1, rig), turn_to_safe(percept, safe, -1, rig))
     return bool(turn > math.radians(params.key_deg))
@@ -470,8 +470,7 @@ def prepare(
         if shared["ask_direction"][q] >= 0:
             memory["thinks"] = 1
     sensor = rig.sensor
-    rule = GAP_RULE if memory["looped"] else PRINTED_RULE
-    safe_directions(work, sensor.range_min, sensor.range_max, sensor.wraps, rig.reach[rule], edges, safe)
+    safe_directions(work, sensor.range_min, sensor.range_max, sensor.wraps, rig.reach[GAP_RULE], edges, safe)
     if dh_bug.advance(ranges, work, percept, shared, memory, decision, safe, rig, _driving(params)):
         memory["stage"] = DRIVES
         horizon = rig.protection.l_th + params.ask_ahead_s * rig.body.v_max

@@ -1,7 +1,9 @@
 """DH-Bug (GIWT 4.2): straight to the goal, along what is in the way, and one choice of side at every key point.
 
 The distance histogram is the scan cut at l_th; a direction is safe when the printed sector (60 degrees wide) and the
-swept footprint are free up to l_th. There is no look-ahead, and nothing is said to anybody.
+swept footprint are free up to l_th. There is no look-ahead, and nothing is said to anybody. With ``sector`` 0 a
+direction is safe when what the body sweeps is free for 1.2 m (``safety.narrow_m``): gaps that the body fits through are
+taken, as GIWT's safe zone (1) has it.
 
 A      turns to the goal, or to the edge beside it; B drives there
 key    no safe direction within ``key_deg`` of the goal: ``choose_turn`` gives a side; that is all an optimiser replaces
@@ -100,6 +102,8 @@ class Params(NamedTuple):
     """Of the random side, together with the robot's address and the number of its choices."""
     told: int = 0
     """1: an oracle's side is taken where one is given."""
+    sector: int = 1
+    """0: a direction needs no free sector, only room for the body."""
     key_deg: float = 80.0
     """pi/2 - theta_1: with no safe direction this close to the goal's there is a key point."""
     face_deg: float = 10.0
@@ -200,7 +204,7 @@ def step(
         scratch.header[row], angles, distances, rig, params.still_s,
     )  # fmt: skip
     sensor = rig.sensor
-    rule = GAP_RULE if memory["looped"] else PRINTED_RULE
+    rule = PRINTED_RULE if params.sector and not memory["looped"] else GAP_RULE
     safe_directions(work, sensor.range_min, sensor.range_max, sensor.wraps, rig.reach[rule], edges, safe)
     if not advance(ranges, work, percept, shared, memory, decision, safe, rig, params):
         if memory["mode"] == KEY_POINT:
