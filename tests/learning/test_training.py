@@ -10,13 +10,25 @@ pytest.importorskip("torch_geometric")
 
 from swarmscope.errors import ConfigError, InputFileError, SwarmscopeError  # noqa: E402
 from swarmscope.learning import checkpoints, export, models, train  # noqa: E402
-from swarmscope.learning.batches import make_batch  # noqa: E402
+from swarmscope.learning.batches import View, make_batch  # noqa: E402
 from swarmscope.learning.config import parse_config, read_config  # noqa: E402
-from swarmscope.learning.evaluate import ahead_of, judge, majority, open_trained, read_test, share  # noqa: E402
+from swarmscope.learning.evaluate import (  # noqa: E402
+    ahead_of,
+    as_sent,
+    coin_regret,
+    judge,
+    majority,
+    open_trained,
+    read_test,
+    share,
+)
 from swarmscope.learning.generate import generate  # noqa: E402
 from swarmscope.learning.records import load  # noqa: E402
 
 SMALL = {"sets": ["A-II-driven"], "channels": [4, 8, 8], "batch": 32, "threads": 2, "precision": "float32"}
+
+VIEW = View(5.0, 5.0)
+FAR = np.full(40, 5.0)
 
 
 @pytest.fixture(scope="module")
@@ -124,12 +136,25 @@ def test_absent_robots_and_their_order_do_not_matter(variant, data):
 def test_a_mirrored_sample_is_the_sample_of_the_mirrored_world(data):
     shard = load(data)["A-II-driven"]
     chosen = np.arange(40)
-    plain = make_batch(shard, chosen, np.zeros(40, bool))
-    mirrored = make_batch(shard, chosen, np.ones(40, bool))
+    plain = make_batch(shard, chosen, np.zeros(40, bool), FAR, VIEW)
+    mirrored = make_batch(shard, chosen, np.ones(40, bool), FAR, VIEW)
     assert np.array_equal(plain.maps[:, :, ::-1], mirrored.maps)
     assert np.array_equal(plain.right, 1 - mirrored.right)
     rows, columns = np.divmod(plain.cells, 7)
     assert np.array_equal(np.where(plain.present > 0, (6 - rows) * 7 + columns, 24), mirrored.cells)
+
+
+def test_features_of_others_come_in_bytes_and_the_own_ones_exactly(data):
+    shard = load(data)["A-II-driven"]
+    batch = make_batch(shard, np.arange(40), np.zeros(40, bool), FAR, VIEW)
+    features = torch.randn(len(batch.maps), 128)
+    sent = as_sent(features, batch)
+    own = batch.slots[:, 0]
+    others = np.setdiff1d(np.arange(len(features)), own)
+    assert len(others) > 0 and torch.equal(sent[own], features[own])
+    error = (sent[others] - features[others]).abs().amax(1) / features[others].abs().amax(1)
+    assert 0.0 < float(error.max()) < 2.0**0.125 / 254.0 + 1e-6
+    assert coin_regret(shard) == pytest.approx(float(shard.detour_m.mean()) / 2.0)
 
 
 def test_bad_checkpoints_and_configurations_are_named(tmp_path):

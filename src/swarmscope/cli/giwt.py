@@ -19,6 +19,9 @@ from swarmscope.cli._console import PlainConsole
 from swarmscope.errors import ConfigError, MissingExtraError
 from swarmscope.learning.generate import DRIVEN, PLACED, generate, totals, verify
 
+RADII_SAMPLES = 12_000
+"""Samples on which networks are scored for every radius."""
+
 
 def data_command(folder: Path, sets: Sequence[str], samples: int, workers: int | None, check: bool) -> None:
     """Bring a data folder to ``samples`` samples for each set, or check what is there; print a table."""
@@ -85,16 +88,33 @@ def train_command(config: str, data: Path, out: Path | None, init: Path | None, 
 
 
 def eval_command(
-    runs: Sequence[Path], data: Path, sets: Sequence[str], split: str, out: Path | None, pictures: Path | None
+    runs: Sequence[Path],
+    data: Path,
+    sets: Sequence[str],
+    split: str,
+    radii: Sequence[float],
+    out: Path | None,
+    pictures: Path | None,
 ) -> None:
     """Score trained networks on every set and compare the first with the others."""
     _need("torch", "torch_geometric", "safetensors")
-    from swarmscope.learning.evaluate import ahead_of, data_key, judge, majority, open_trained, read_test, regret, share
+    from swarmscope.learning.evaluate import (
+        ahead_of,
+        coin_regret,
+        data_key,
+        judge,
+        lost_on_the_radio,
+        majority,
+        open_trained,
+        read_test,
+        regret,
+        share,
+    )
     from swarmscope.learning.records import SPLITS
 
     if split not in SPLITS:
         raise ConfigError("--split", f"'{split}' is none of {', '.join(SPLITS)}")
-    networks = [open_trained(path) for path in runs]
+    networks = _told_apart([open_trained(path) for path in runs])
     shards = read_test(data, expand(sets), split)
     result: dict[str, Any] = {"data": data_key(data, list(shards)), "split": split, "sets": {}}
     everything: list[list[Any]] = [[] for _ in networks]
@@ -109,11 +129,13 @@ def eval_command(
             for one, verdict in zip(networks, verdicts, strict=True):
                 row = {"label": one.label, "checkpoint": str(one.path), "accuracy": share(verdict.hit, verdict.map)}
                 row |= {"regret_m": regret(verdict), "first_ahead": ahead_of(verdicts[0], verdict)}
+                row |= {"lost_on_the_radio": lost_on_the_radio(verdict)}
                 rows.append({k: v._asdict() if hasattr(v, "_asdict") else v for k, v in row.items()})
             for kept, verdict in zip(everything, verdicts, strict=True):
                 kept.append(verdict)
             most = majority(shard)
-            result["sets"][name] = {"samples": shard.samples, "majority": most, "networks": rows}
+            about = {"samples": shard.samples, "majority": most, "coin_regret_m": coin_regret(shard)}
+            result["sets"][name] = about | {"networks": rows}
             table.add_row(name, str(shard.samples), f"{100 * most:.1f}", *(_words(r["accuracy"]) for r in rows))
             if out is not None:
                 _save(out, result)
@@ -124,18 +146,51 @@ def eval_command(
     result["mean_accuracy"] = {one.label: value for one, value in zip(networks, means, strict=True)}
     console = PlainConsole(width=None if sys.stdout.isatty() else 170)
     console.print(table)
-    if len(networks) > 1:
-        console.print(_difference_table(result, [one.label for one in networks]))
+    console.print(_difference_table(result, [one.label for one in networks]))
+    console.print(_regret_table(result, [one.label for one in networks]))
+    scores = _at_radii(networks, shards, radii, console) if radii else {}
+    result["radii"] = {label: {f"{r:g}": s._asdict() for r, s in row.items()} for label, row in scores.items()}
     if out is not None:
         _save(out, result)
         print(out)
     if pictures is not None:
-        _draw(pictures, networks, shards, result)
+        _draw(pictures, networks, shards, scores)
 
 
-def _draw(folder: Path, networks: Sequence[Any], shards: dict[str, Any], result: dict[str, Any]) -> None:
-    """Draw the first network's layers, and accuracy against radius where networks differ in it."""
-    from swarmscope.learning.evaluate import Score
+def _told_apart(networks: list[Any]) -> list[Any]:
+    """Return networks with labels of their own: those that share one get the name of their folder."""
+    labels = [one.label for one in networks]
+    same = [labels.count(one.label) > 1 for one in networks]
+    return [
+        one._replace(label=f"{one.label} ({one.path.parent.name})") if twice else one
+        for one, twice in zip(networks, same, strict=True)
+    ]
+
+
+def _at_radii(networks: Sequence[Any], shards: dict[str, Any], radii: Sequence[float], console: Console) -> Any:
+    """Score networks with robots that see less far, on some samples of all sets; print a table."""
+    from swarmscope.learning.evaluate import judge, share
+    from swarmscope.learning.records import concatenate, some
+
+    whole = some(concatenate(list(shards.values())), RADII_SAMPLES)
+    table = Table(title=f"accuracy on {whole.samples} samples of all sets by perception radius, % (95 %)")
+    table.add_column("radius", justify="right")
+    for one in networks:
+        table.add_column(one.label, justify="right")
+    scores: dict[str, dict[float, Any]] = {one.label: {} for one in networks}
+    with _bar() as bar:
+        job = bar.add_task("radii", total=len(networks) * len(radii) * whole.samples, note="")
+        for radius in radii:
+            for one in networks:
+                verdict = judge(one, whole, lambda done: bar.advance(job, done), radius)
+                scores[one.label][radius] = share(verdict.hit, verdict.map)
+            table.add_row(f"{radius:g} m", *(_words(scores[one.label][radius]._asdict()) for one in networks))
+    console.print(table)
+    return scores
+
+
+def _draw(folder: Path, networks: Sequence[Any], shards: dict[str, Any], scores: dict[str, Any]) -> None:
+    """Draw the first network's layers, and accuracy against radius where it was asked for."""
     from swarmscope.learning.figures import radius_png, tsne_png
     from swarmscope.learning.records import concatenate, write_atomically
 
@@ -143,10 +198,7 @@ def _draw(folder: Path, networks: Sequence[Any], shards: dict[str, Any], result:
         bar.add_task("pictures", total=None, note="")
         whole = concatenate(list(shards.values()))
         contents = {"layers.png": tsne_png(networks[0], whole)}
-        if len({one.config.view_m for one in networks}) > 1:
-            scores: dict[str, dict[float, Score]] = {}
-            for one, score in zip(networks, result["whole"], strict=True):
-                scores.setdefault(one.label, {})[one.config.view_m] = Score(**score)
+        if scores:
             contents["radius.png"] = radius_png(scores)
     for name, data in contents.items():
         write_atomically(folder / name, data)
@@ -227,16 +279,25 @@ def _mean(result: dict[str, Any], k: int) -> float:
 
 
 def _difference_table(result: dict[str, Any], labels: list[str]) -> Table:
-    table = Table(title=f"{labels[0]} minus the others, percentage points; and metres lost by wrong sides")
-    for column in ("set", *labels[1:], *(f"{label} [m]" for label in labels)):
+    table = Table(title=f"{labels[0]} minus the others, and its features exact minus in bytes: percentage points")
+    for column in ("set", *labels[1:], "bytes"):
         table.add_column(column, justify="right")
     for name, entry in result["sets"].items():
         rows = entry["networks"]
-        ahead = []
-        for row in rows[1:]:
-            value, low, high = (100 * row["first_ahead"][key] for key in ("value", "low", "high"))
-            ahead.append(f"{value:+.2f} ({low:+.2f}..{high:+.2f})")
-        table.add_row(name, *ahead, *(f"{r['regret_m']['value']:.3f}" for r in rows))
+        apart = [*(row["first_ahead"] for row in rows[1:]), rows[0]["lost_on_the_radio"]]
+        words = (tuple(100 * score[key] for key in ("value", "low", "high")) for score in apart)
+        table.add_row(name, *(f"{value:+.2f} ({low:+.2f}..{high:+.2f})" for value, low, high in words))
+    return table
+
+
+def _regret_table(result: dict[str, Any], labels: list[str]) -> Table:
+    table = Table(title="detours because of wrong sides, m a choice (share of a coin's detours saved)")
+    for column in ("set", "coin", *labels):
+        table.add_column(column, justify="right")
+    for name, entry in result["sets"].items():
+        coin = entry["coin_regret_m"]
+        lost = [row["regret_m"]["value"] for row in entry["networks"]]
+        table.add_row(name, f"{coin:.3f}", *(f"{value:.3f} ({100 * (1 - value / coin):.1f} %)" for value in lost))
     return table
 
 

@@ -387,13 +387,16 @@ def giwt_eval(
     data: GiwtData = Path("runs/giwt/data"),
     set_of: GiwtSets = None,
     split: Annotated[str, typer.Option(help="train, validation or test.")] = "test",
+    radius: Annotated[
+        list[float] | None, typer.Option(min=0.1, help="Also score robots that see only so far, metres; several times.")
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="JSON file for all figures.")] = None,
     pictures: Annotated[Path | None, typer.Option(help="Folder for pictures of layers and of radii.")] = None,
 ) -> None:
     """Score trained networks on maps that no training saw."""
     from swarmscope.cli.giwt import eval_command
 
-    eval_command(runs, data, set_of or ["placed"], split, out, pictures)
+    eval_command(runs, data, set_of or ["placed"], split, radius or [], out, pictures)
 
 
 @giwt.command("ceiling", epilog="Example: [bold]swarmscope giwt ceiling --set-of driven --view 5[/bold]")

@@ -1,7 +1,7 @@
 """From shards to batches: scans are drawn into pictures when they are needed (26 us each).
 
 Mirroring a sample about the target direction (rows of pictures, positions, side) gives another true sample. Training
-does that with half of them at random.
+does that with half of them at random, and lets robots see less far in some.
 """
 
 from __future__ import annotations
@@ -17,10 +17,25 @@ from swarmscope.learning.records import Shard
 from swarmscope.onboard.perception.local_map import CELL_ANGLE, CELL_DISTANCE, CELLS, CHANNELS, draw_map
 from swarmscope.onboard.planning._giwt_graph import (
     OWN_CELL,
-    VIEW_M,
     information_gain_series,
     position_cell,
 )
+
+SHORTEST_M = 1.0
+"""The least that a robot sees in training."""
+
+
+class View(NamedTuple):
+    """What networks get to see of a sample."""
+
+    radius_m: float
+    """Of the pictures."""
+    seen_m: float
+    """How far robots see, at most ``radius_m``."""
+    alone: bool = False
+    """Neighbours are left out."""
+    shorter: float = 0.0
+    """In training: share of the samples in which robots see less far, by chance."""
 
 
 class Batch(NamedTuple):
@@ -42,23 +57,29 @@ class Batch(NamedTuple):
     """(B,)."""
 
 
-def batches(
-    data: Shard, size: int, view_m: float = VIEW_M, alone: bool = False, rng: np.random.Generator | None = None
-) -> Iterator[Batch]:
-    """Yield the samples in batches; with ``rng`` shuffled and mirrored at random. ``alone`` leaves out neighbours."""
+def batches(data: Shard, size: int, view: View, rng: np.random.Generator | None = None) -> Iterator[Batch]:
+    """Yield the samples in batches, for training with ``rng``: shuffled, mirrored and short-sighted at random."""
     order = np.arange(data.samples) if rng is None else rng.permutation(data.samples)
     mirrored = np.zeros(data.samples, np.bool_) if rng is None else rng.random(data.samples) < 0.5
+    seen = np.full(data.samples, view.seen_m)
+    if rng is not None and view.shorter > 0.0:
+        short = rng.random(data.samples) < view.shorter
+        seen[short] = rng.uniform(SHORTEST_M, view.seen_m, int(short.sum()))
     for k in range(0, data.samples, size):
         chosen = order[k : k + size]
-        yield make_batch(data, chosen, mirrored[chosen], view_m, alone)
+        yield make_batch(data, chosen, mirrored[chosen], seen[chosen], view)
 
 
 def make_batch(
-    data: Shard, chosen: NDArray[np.int64], mirrored: NDArray[np.bool_], view_m: float = VIEW_M, alone: bool = False
+    data: Shard,
+    chosen: NDArray[np.int64],
+    mirrored: NDArray[np.bool_],
+    seen_m: NDArray[np.float64],
+    view: View,
 ) -> Batch:
-    """Return the samples ``chosen (B,)``, mirrored where told."""
+    """Return the samples ``chosen (B,)``, mirrored where told, all its robots seeing as far as ``seen_m (B,)``."""
     begin, end = data.first[chosen], data.first[chosen + 1]
-    if alone:
+    if view.alone:
         end = begin + 1
     count = end - begin
     width = int(count.max())
@@ -71,11 +92,12 @@ def make_batch(
     x, y = data.node_x[nodes].astype(np.float64), data.node_y[nodes] * np.repeat(sign, count)
     cells, gains = np.full(present.shape, OWN_CELL), np.zeros(present.shape, np.float32)
     cells[present] = [position_cell(a, b) for a, b in zip(x, y, strict=True)]
-    gains[present] = [information_gain_series(d, view_m) for d in np.hypot(x, y)]
+    sees = np.repeat(seen_m, count)
+    gains[present] = [information_gain_series(d, r) for d, r in zip(np.hypot(x, y), sees, strict=True)]
     maps = np.empty((len(nodes), CHANNELS, CELLS, CELLS), np.uint8)
     draw_all(
-        data.codes, data.node_scan[nodes], data.node_target[nodes], np.repeat(mirrored, count), view_m,
-        CELL_ANGLE, CELL_DISTANCE, maps,
+        data.codes, data.node_scan[nodes], data.node_target[nodes], np.repeat(mirrored, count), view.radius_m,
+        sees, CELL_ANGLE, CELL_DISTANCE, maps,
     )  # fmt: skip
     right = np.where(data.side[chosen] * sign > 0.0, 0, 1)
     return Batch(maps, slots, cells, gains, present.astype(np.float32), right, data.detour_m[chosen])
@@ -87,7 +109,8 @@ def draw_all(
     scan: np.ndarray,
     target: np.ndarray,
     mirrored: np.ndarray,
-    view_m: float,
+    radius_m: float,
+    seen_m: np.ndarray,
     cell_angle: np.ndarray,
     cell_distance: np.ndarray,
     out: np.ndarray,
@@ -95,7 +118,7 @@ def draw_all(
     """Draw pictures of a full circle of beams, those ``mirrored`` with left and right exchanged."""
     increment = 2.0 * np.pi / codes.shape[1]
     for e in range(scan.shape[0]):
-        draw_map(codes[scan[e]], -np.pi, increment, target[e], view_m, cell_angle, cell_distance, out[e])
+        draw_map(codes[scan[e]], -np.pi, increment, target[e], radius_m, seen_m[e], cell_angle, cell_distance, out[e])
         if mirrored[e]:
             for channel in range(out.shape[1]):
                 for row in range(out.shape[2] // 2):

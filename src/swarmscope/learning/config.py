@@ -10,7 +10,6 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from swarmscope.errors import ConfigError, InputFileError
 from swarmscope.learning.generate import DRIVEN, PLACED, parse_set
-from swarmscope.onboard.planning._giwt_graph import VIEW_M
 
 FOLDER = Path(__file__).parent.parent / "data" / "training"
 Count = Annotated[int, Field(ge=1)]
@@ -34,8 +33,10 @@ class TrainingConfig(BaseModel):
     as_printed: bool = False
     """giwt: nothing beyond (4)-(9), see learning/models.py."""
     dropout: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.0
-    view_m: Positive = VIEW_M
-    """Radius of the pictures."""
+    view_m: Positive = 5.0
+    """Radius of the pictures: the range of the sensor; the document has 2.5 m."""
+    shorter: Annotated[float, Field(ge=0.0, le=1.0)] = 0.25
+    """Share of the training samples in which robots see less far, 1 m to view_m: for sensors of a shorter range."""
     epochs: Count = 20
     samples_per_epoch: Count = 60_000
     """Drawn anew for every epoch; all of the training data if it holds fewer."""

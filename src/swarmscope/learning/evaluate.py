@@ -15,12 +15,14 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from swarmscope._jit import jit
 from swarmscope.learning import checkpoints
-from swarmscope.learning.batches import batches
+from swarmscope.learning.batches import Batch, batches
 from swarmscope.learning.config import TrainingConfig, parse_config
 from swarmscope.learning.models import Chooser
 from swarmscope.learning.records import SPLITS, Shard, content_key, load, read_manifest, select, split_of
-from swarmscope.learning.train import BEST, autocast, forward, place, set_up
+from swarmscope.learning.train import BEST, autocast, decide, encode, place, set_up, view_of
+from swarmscope.onboard.planning._giwt_graph import quantise, restore
 
 RESAMPLES = 2000
 Floats = NDArray[np.float64]
@@ -42,6 +44,8 @@ class Verdict(NamedTuple):
 
     hit: NDArray[np.bool_]
     """(n,) whether the side is the expert's."""
+    hit_as_sent: NDArray[np.bool_]
+    """(n,) the same with neighbours' features as they come over the radio, in bytes."""
     p_left: NDArray[np.float32]
     """(n,)."""
     map: NDArray[np.int64]
@@ -85,21 +89,49 @@ def data_key(data: Path, names: list[str]) -> str:
 
 
 @torch.no_grad()
-def judge(trained: Trained, data: Shard, report: Callable[[int], None] | None = None) -> Verdict:
-    """Return the network's answers on ``data``."""
+def judge(
+    trained: Trained, data: Shard, report: Callable[[int], None] | None = None, seen_m: float = math.inf
+) -> Verdict:
+    """Return the network's answers on ``data``, of robots that see ``seen_m`` far."""
     config, model = trained.config, trained.model.eval()
+    view = view_of(config)
+    view = view._replace(seen_m=min(seen_m, view.seen_m))
     set_up(config.threads, config.seed)
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
     place(model, device)
-    parts = []
-    for batch in batches(data, 2 * config.batch, config.view_m, config.network == "cnn"):
+    parts: list[tuple[NDArray[np.float32], NDArray[np.float32]]] = []
+    for batch in batches(data, 2 * config.batch, view):
         with autocast(config, device):
-            logits = forward(model, batch, device).float()
-        parts.append(torch.softmax(logits, dim=1)[:, 0].cpu().numpy())
+            features = encode(model, batch, device)
+            logits = decide(model, features, batch, device)
+            sent = decide(model, as_sent(features, batch), batch, device)
+        exact, received = (torch.softmax(x.float(), dim=1)[:, 0].cpu().numpy() for x in (logits, sent))
+        parts.append((exact, received))
         if report is not None:
             report(len(batch.right))
-    p_left = np.concatenate(parts) if parts else np.zeros(0, np.float32)
-    return Verdict((p_left > 0.5) == (data.side > 0), p_left, data.map, data.detour_m)
+    if not parts:
+        parts.append((np.zeros(0, np.float32), np.zeros(0, np.float32)))
+    p_left, p_sent = (np.concatenate(part) for part in zip(*parts, strict=True))
+    left = data.side > 0
+    return Verdict((p_left > 0.5) == left, (p_sent > 0.5) == left, p_left, data.map, data.detour_m)
+
+
+def as_sent(features: torch.Tensor, batch: Batch) -> torch.Tensor:
+    """Return features (E, F) as the decider has them: its own exactly, those of others in bytes."""
+    values = features.cpu().numpy().copy()
+    others = np.ones(len(values), np.bool_)
+    others[batch.slots[:, 0]] = False
+    through_bytes(values, others, np.zeros(values.shape[1], np.uint8))
+    return torch.from_numpy(values).to(features.device)
+
+
+@jit
+def through_bytes(features: np.ndarray, chosen: np.ndarray, codes: np.ndarray) -> None:
+    """Quantise and restore the ``chosen (E,)`` rows of ``features (E, F)`` in place; ``codes (F,)`` is scratch."""
+    for e in range(features.shape[0]):
+        if chosen[e]:
+            scale = quantise(features[e], codes)
+            restore(codes, scale, features[e])
 
 
 def share(values: NDArray[np.float64] | NDArray[np.bool_], maps: NDArray[np.int64]) -> Score:
@@ -122,9 +154,19 @@ def ahead_of(one: Verdict, other: Verdict) -> Score:
     return share(one.hit.astype(np.float64) - other.hit, one.map)
 
 
+def lost_on_the_radio(verdict: Verdict) -> Score:
+    """Return by how much less often sides are right with features in bytes."""
+    return share(verdict.hit.astype(np.float64) - verdict.hit_as_sent, verdict.map)
+
+
 def regret(verdict: Verdict) -> Score:
     """Return the mean detour [m] that wrong sides cost."""
     return share(np.where(verdict.hit, 0.0, verdict.detour_m.astype(np.float64)), verdict.map)
+
+
+def coin_regret(data: Shard) -> float:
+    """Return the mean detour [m] that tossing a coin costs."""
+    return 0.5 * float(data.detour_m.mean())
 
 
 def majority(data: Shard) -> float:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from swarmscope.learning.batches import make_batch
 from swarmscope.learning.evaluate import Score, Trained
 from swarmscope.learning.records import Shard
+from swarmscope.learning.train import view_of
 
 LAYERS = ("input", "encoder", "graph layer", "final layer")
 LEFT, RIGHT = "#2166ac", "#b2182b"
@@ -25,8 +26,8 @@ def layers(trained: Trained, data: Shard, seed: int = 0) -> tuple[dict[str, NDAr
     """Return what every layer says of POINTS samples, (n, width) each, and their classes (n,): 0 left, 1 right."""
     rng = np.random.default_rng(seed)
     chosen = np.sort(rng.permutation(data.samples)[:POINTS])
-    alone = trained.config.network == "cnn"
-    batch = make_batch(data, chosen, np.zeros(len(chosen), np.bool_), trained.config.view_m, alone)
+    view = view_of(trained.config)
+    batch = make_batch(data, chosen, np.zeros(len(chosen), np.bool_), np.full(len(chosen), view.seen_m), view)
     model = trained.model.eval().cpu()
     features = torch.cat([model.encoder(torch.from_numpy(part).float()) for part in np.array_split(batch.maps, 40)])
     slots, cells, gains, present = (torch.from_numpy(a) for a in (batch.slots, batch.cells, batch.gains, batch.present))

@@ -174,11 +174,6 @@ class Chooser(nn.Module):
         out: Tensor = self.mapper(self.fusion(features, cells, gains, present))
         return out
 
-    def forward(self, maps: Tensor, slots: Tensor, cells: Tensor, gains: Tensor, present: Tensor) -> Tensor:
-        """Return logits (B, 2); ``slots (B, K)`` says which of ``maps (E, ...)`` a robot has (any where absent)."""
-        features = self.encoder(maps).float()
-        return self.decide(features[slots] * present.unsqueeze(-1), cells, gains, present)
-
 
 def _fusion(architecture: Architecture) -> nn.Module:
     if architecture.network == "giwt":

@@ -111,6 +111,15 @@ def select(shard: Shard, chosen: NDArray[np.bool_]) -> Shard:
     return Shard(codes=shard.codes, first=first, **rows, **kept)
 
 
+def some(shard: Shard, samples: int, seed: int = 0) -> Shard:
+    """Return so many samples drawn at random, or all if there are fewer."""
+    if shard.samples <= samples:
+        return shard
+    chosen = np.zeros(shard.samples, np.bool_)
+    chosen[np.random.default_rng([seed, 1]).permutation(shard.samples)[:samples]] = True
+    return select(shard, chosen)
+
+
 def split_of(maps: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return the index into SPLITS of each map seed."""
     return np.asarray(SPLIT_OF[maps % len(SPLIT_OF)], dtype=np.int64)

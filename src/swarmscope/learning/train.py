@@ -23,7 +23,7 @@ from torch.nn import functional
 from swarmscope.errors import ConfigError, SwarmscopeError
 from swarmscope.evaluation.provenance import git_revision, versions
 from swarmscope.learning import checkpoints
-from swarmscope.learning.batches import Batch, batches
+from swarmscope.learning.batches import Batch, View, batches
 from swarmscope.learning.config import TrainingConfig
 from swarmscope.learning.models import Architecture, Chooser
 from swarmscope.learning.records import (
@@ -34,6 +34,7 @@ from swarmscope.learning.records import (
     load,
     read_manifest,
     select,
+    some,
     split_of,
     write_atomically,
 )
@@ -62,6 +63,11 @@ def architecture_of(config: TrainingConfig) -> Architecture:
         config.use_gain if giwt else False, config.use_position if giwt else False,
         config.as_printed if giwt else False, config.dropout,
     )  # fmt: skip
+
+
+def view_of(config: TrainingConfig) -> View:
+    """Return what a configuration's network gets to see."""
+    return View(config.view_m, config.view_m, config.network == "cnn", config.shorter)
 
 
 def train(
@@ -139,12 +145,7 @@ def read_splits(config: TrainingConfig, data: Path) -> tuple[Shard, Shard]:
     training, validation = (select(whole, splits == SPLITS.index(s)) for s in ("train", "validation"))
     if not training.samples or not validation.samples:
         raise ConfigError(str(data), "has no samples for training or for validation; generate more")
-    if validation.samples > config.validation_samples:
-        chosen = np.zeros(validation.samples, np.bool_)
-        order = np.random.default_rng([config.seed, 1]).permutation(validation.samples)
-        chosen[order[: config.validation_samples]] = True
-        validation = select(validation, chosen)
-    return training, validation
+    return training, some(validation, config.validation_samples, config.seed)
 
 
 def _resume(
@@ -185,7 +186,7 @@ def _epoch(
         training = select(training, chosen)
     model.train()
     loss_sum, right, seen = 0.0, 0, 0
-    for step, batch in enumerate(batches(training, config.batch, config.view_m, config.network == "cnn", rng)):
+    for step, batch in enumerate(batches(training, config.batch, view_of(config), rng)):
         if len(batch.right) < 2:
             continue  # batch normalisation needs two
         for group in optimizer.param_groups:
@@ -222,10 +223,21 @@ def schedule(progress: float, config: TrainingConfig) -> float:
 
 def forward(model: Chooser, batch: Batch, device: torch.device) -> Tensor:
     """Return the logits (B, 2) of a batch."""
+    return decide(model, encode(model, batch, device), batch, device)
+
+
+def encode(model: Chooser, batch: Batch, device: torch.device) -> Tensor:
+    """Return the features (E, F) of a batch's pictures."""
     maps = torch.from_numpy(batch.maps).to(device, torch.float32).contiguous(memory_format=torch.channels_last)
-    arrays = (batch.slots, batch.cells, batch.gains, batch.present)
-    out: Tensor = model(maps, *(torch.from_numpy(a).to(device) for a in arrays))
+    out: Tensor = model.encoder(maps).float()
     return out
+
+
+def decide(model: Chooser, features: Tensor, batch: Batch, device: torch.device) -> Tensor:
+    """Return the logits (B, 2) of a batch whose pictures have these features (E, F)."""
+    arrays = (batch.slots, batch.cells, batch.gains, batch.present)
+    slots, cells, gains, present = (torch.from_numpy(a).to(device) for a in arrays)
+    return model.decide(features[slots] * present.unsqueeze(-1), cells, gains, present)
 
 
 def autocast(config: TrainingConfig, device: torch.device) -> Any:
@@ -245,7 +257,7 @@ def evaluate(model: Chooser, data: Shard, config: TrainingConfig, device: torch.
     """Return the model's scores on ``data``, in the precision of the training."""
     model.eval()
     loss, right, regret = 0.0, 0, 0.0
-    for batch in batches(data, 2 * config.batch, config.view_m, config.network == "cnn"):
+    for batch in batches(data, 2 * config.batch, view_of(config)):
         with autocast(config, device):
             logits = forward(model, batch, device).float()
         classes = torch.from_numpy(batch.right).to(device)

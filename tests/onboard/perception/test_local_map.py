@@ -32,9 +32,9 @@ def codes_of(ranges):
     return codes
 
 
-def picture(codes, target=0.0, radius=2.5):
+def picture(codes, target=0.0, radius=2.5, seen=2.5):
     out = np.full((2, CELLS, CELLS), 9, np.uint8)
-    draw_map(codes, -math.pi, INCREMENT, target, radius, CELL_ANGLE, CELL_DISTANCE, out)
+    draw_map(codes, -math.pi, INCREMENT, target, radius, seen, CELL_ANGLE, CELL_DISTANCE, out)
     return out
 
 
@@ -55,6 +55,12 @@ def test_a_wall_ahead_is_a_line_of_hits_and_hides_what_is_behind():
     assert drawn[FREE, near, MIDDLE : column - 1].all()
     assert not drawn[:, near, column + 2 :].any()
     assert drawn[FREE, MIDDLE, 0] == 1  # nothing behind the robot
+
+
+def test_a_sensor_that_sees_less_far_leaves_the_rest_unknown():
+    drawn = picture(codes_of(np.full(BEAMS, np.inf)), radius=5.0, seen=2.5)
+    assert drawn[FREE, MIDDLE, MIDDLE + 25] == 1 and drawn[FREE, MIDDLE, MIDDLE + 26] == 0
+    assert drawn[FREE].sum() == pytest.approx(math.pi * 25.0**2, rel=0.02) and not drawn[HIT].any()
 
 
 def test_nothing_is_drawn_beyond_the_radius_and_nothing_is_both():

@@ -127,7 +127,8 @@ def picture_of(robots, i, pose, other, target):
     x, y, _ = seen_from(pose, other)
     hide_robot(codes, sensor.angle_min, sensor.increment, sensor.wraps, x, y, 0.15)
     out = np.zeros((2, 101, 101), np.uint8)
-    draw_map(codes, sensor.angle_min, sensor.increment, target - pose[2], VIEW_M, CELL_ANGLE, CELL_DISTANCE, out)
+    towards = target - pose[2]
+    draw_map(codes, sensor.angle_min, sensor.increment, towards, VIEW_M, VIEW_M, CELL_ANGLE, CELL_DISTANCE, out)
     return out[None].astype(np.float32)
 
 
@@ -249,10 +250,10 @@ def test_it_asks_on_the_way_before_it_has_to_stand(model):
     robots = Robots(planner_of(model))
     sensor = robots.rig.sensor
     bearing = sensor.angle_min + sensor.increment * np.arange(sensor.beams) - robots.percepts["goal_bearing"][0]
-    bay = np.abs((bearing + math.pi) % (2.0 * math.pi) - math.pi) < math.radians(70.0)
-    robots.ranges[0] = np.where(bay, 1.0, np.inf)
-    assert robots.step().sent(0) == []  # 0.5 s from where a side has to be chosen is 0.85 m from the bay's end
-    robots.ranges[0] = np.where(bay, 0.8, np.inf)
+    bay = np.abs((bearing + math.pi) % (2.0 * math.pi) - math.pi) < math.radians(85.0)
+    robots.ranges[0] = np.where(bay, 1.6, np.inf)
+    assert robots.step().sent(0) == []  # 0.5 s from where a side has to be chosen is 1.45 m from the bay's end
+    robots.ranges[0] = np.where(bay, 1.35, np.inf)
     robots.step()
     assert robots.decisions["v"][0] > 0.0
     assert [header[0] for _, header, _ in robots.sent(0)] == [KIND_DIRECTED_REQUEST]

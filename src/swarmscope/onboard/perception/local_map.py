@@ -85,6 +85,7 @@ def draw_map(
     increment: float,
     target: float,
     radius_m: float,
+    seen_m: float,
     cell_angle: np.ndarray,
     cell_distance: np.ndarray,
     out: np.ndarray,
@@ -92,14 +93,15 @@ def draw_map(
     """Draw the scan ``codes (M,)`` uint8 into ``out (CHANNELS, CELLS, CELLS)``, x along ``target`` [rad, body frame].
 
     ``cell_angle``, ``cell_distance`` are those of ``polar_cells``. Beam n looks at ``angle_min + n increment``; cells
-    that no beam comes near (a scan of less than a full circle) stay unknown.
+    that no beam comes near (a scan of less than a full circle) stay unknown, and those farther than the sensor sees,
+    ``seen_m``.
     """
     beams = codes.shape[0]
     cell_m = 2.0 * radius_m / (CELLS - 1)
     per_circle = 2.0 * math.pi / increment
     shift = (target - angle_min) / increment
     per_code = CODE_STEP_M / cell_m
-    rim = 0.5 * (CELLS - 1)
+    rim = min(0.5 * (CELLS - 1), seen_m / cell_m)
     for row in range(CELLS):
         for column in range(CELLS):
             out[HIT, row, column] = 0

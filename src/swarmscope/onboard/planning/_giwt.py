@@ -236,7 +236,8 @@ def _think(
     own = network.encode(picture)
     features, cells, gains = empty_graph()
     features[0, 0] = own[0]
-    n = gather(i, percepts, shared, memories, decisions, rig, params, network.view_m, features[0], cells[0], gains[0])
+    seen_m = min(network.view_m, rig.sensor.range_max)
+    n = gather(i, percepts, shared, memories, decisions, rig, params, seen_m, features[0], cells[0], gains[0])
     k = n + 1
     p_left = float(network.p_left(features[:, :k], cells[:, :k], gains[:, :k])[0])
     if n > 0:  # what each would say alone, for people to read
@@ -274,7 +275,8 @@ def draw(codes: np.ndarray, target: float, view_m: float, rig: Rig, picture: np.
     ``picture`` is (2, 101, 101) float32.
     """
     sensor = rig.sensor
-    draw_map(codes, sensor.angle_min, sensor.increment, target, view_m, CELL_ANGLE, CELL_DISTANCE, picture)
+    seen_m = sensor.range_max
+    draw_map(codes, sensor.angle_min, sensor.increment, target, view_m, seen_m, CELL_ANGLE, CELL_DISTANCE, picture)
 
 
 @jit
