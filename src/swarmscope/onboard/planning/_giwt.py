@@ -86,7 +86,7 @@ class Params(NamedTuple):
     ask: int = 1
     """0: nobody is asked, every side is chosen from the own scan."""
     ask_ahead_s: float = 0.5
-    """Neighbours are asked this long before an obstacle comes within l_th, where a key point may follow."""
+    """Neighbours are asked this long before a key point may follow."""
     ask_every_s: float = 1.0
     """Shortest time between two rounds of requests on the way."""
     answer_s: float = 0.6
@@ -475,7 +475,7 @@ def prepare(
     safe_directions(work, sensor.range_min, sensor.range_max, sensor.wraps, rig.reach[GAP_RULE], edges, safe)
     if dh_bug.advance(ranges, work, percept, shared, memory, decision, safe, rig, _driving(params)):
         memory["stage"] = DRIVES
-        horizon = rig.protection.l_th + params.ask_ahead_s * rig.body.v_max
+        horizon = max(rig.look_ahead, rig.protection.l_th) + params.ask_ahead_s * rig.body.v_max
         if (
             params.ask
             and memory["mode"] != AT_GOAL
