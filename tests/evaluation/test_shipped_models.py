@@ -8,8 +8,8 @@ import pytest
 
 pytest.importorskip("onnxruntime")
 
-from swarmscope.evaluation.runner import figures, play  # noqa: E402
-from swarmscope.evaluation.scenario import parse_scenario  # noqa: E402
+from swarmscope.evaluation.runner import figures, play
+from swarmscope.evaluation.scenario import parse_scenario
 
 MODELS = Path(__file__).parents[2] / "src" / "swarmscope" / "data" / "models"
 PLANNERS = {"giwt": "giwt", "giwt_gat": "gat", "giwt_sage": "graphsage", "giwt_cnn": "cnn"}

@@ -72,7 +72,7 @@ def test_a_search_that_ends_early_has_the_cost_it_was_asked_for(seed):
 
 
 def test_mirroring_the_world_mirrors_the_side():
-    rng = np.random.default_rng(5)
+    rng, compared = np.random.default_rng(5), 0
     for _ in range(20):
         discs = [(float(x), float(y), float(r)) for x, y, r in zip(
             rng.uniform(-1, 3, 6), rng.uniform(-3, 3, 6), rng.uniform(0.3, 1.0, 6), strict=True)]  # fmt: skip
@@ -82,3 +82,5 @@ def test_mirroring_the_world_mirrors_the_side():
         ]
         if found[0].outcome == LABELLED and found[1].outcome == LABELLED and found[0].detour_m > 0.3:
             assert found[0].side == -found[1].side
+            compared += 1
+    assert compared > 5

@@ -1,21 +1,27 @@
 """Shards: what goes in comes out; torn, changed, foreign and missing files are named; stopping loses nothing."""
 
+import errno
 import json
+import os
 
 import numpy as np
 import pytest
 
 from swarmscope.errors import ConfigError, InputFileError
-from swarmscope.learning.generate import generate, make_shard, parse_set, totals, verify
+from swarmscope.learning import generate as generate_module
+from swarmscope.learning.generate import data_card, generate, make_shard, parse_set, totals, verify
 from swarmscope.learning.records import (
     MANIFEST,
     SCHEMA,
     concatenate,
+    content_key,
     load,
+    read_manifest,
     read_shard,
     select,
     split_of,
     to_bytes,
+    write_atomically,
 )
 from swarmscope.learning.scenes import Counts, samples_of
 
@@ -82,7 +88,7 @@ def test_bytes_read_and_selected(folder, tmp_path):
     assert np.array_equal(both.codes[both.node_scan[a]], shard.codes[shard.node_scan[b]])
 
 
-@pytest.mark.parametrize("harm", ["cut", "bit", "gone", "schema", "index", "pickle"])
+@pytest.mark.parametrize("harm", ["cut", "bit", "gone", "schema", "index", "places", "pickle", "array"])
 def test_a_bad_shard_is_named(folder, tmp_path, harm):
     shard = load(folder, ["B-II"])["B-II"]
     manifest = json.loads((folder / MANIFEST).read_text())
@@ -97,6 +103,13 @@ def test_a_bad_shard_is_named(folder, tmp_path, harm):
         sha, data = None, to_bytes(shard._replace(side=shard.side.astype(np.int64)))
     elif harm == "index":
         sha, data = None, to_bytes(shard._replace(node_scan=shard.node_scan + 10**6))
+    elif harm == "places":
+        sha, data = None, to_bytes(shard._replace(place=shard.place[:, :2]))
+    elif harm == "array":
+        sha = None
+        with path.open("wb") as file:
+            np.save(file, shard.codes)
+        data = path.read_bytes()
     elif harm == "pickle":
         sha = None
         np.savez(path, **{name: np.array([print], dtype=object) for name in SCHEMA})
@@ -121,6 +134,67 @@ def test_foreign_folders_and_manifests_are_refused(tmp_path):
         load(tmp_path)
     with pytest.raises(ConfigError, match="none of"):
         parse_set("D-I")
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda m: m.pop("sets"), "'sets' is missing"),
+        (lambda m: m.update(sets=[1]), "'sets' is missing or of another kind"),
+        (lambda m: m["sets"].update({"B-II": {}}), "set 'B-II' has no list of shards"),
+        (lambda m: m["sets"]["B-II"]["shards"][0].pop("sha256"), "'sha256' of shard 0 of set 'B-II'"),
+        (lambda m: m["sets"]["B-II"]["shards"].append("x"), "of set 'B-II' is missing or of another kind"),
+    ],
+)
+def test_a_manifest_of_another_form_is_named(folder, tmp_path, change, words):
+    manifest = json.loads((folder / MANIFEST).read_text())
+    change(manifest)
+    (tmp_path / MANIFEST).write_text(json.dumps(manifest))
+    for read in (load, verify, read_manifest):
+        with pytest.raises(InputFileError, match=words):
+            read(tmp_path)
+
+
+def test_a_set_without_shards_is_a_row_of_zeros(folder):
+    manifest = json.loads((folder / MANIFEST).read_text())
+    manifest["sets"]["C-I"] = {"shards": []}
+    assert set(totals(manifest)["C-I"].values()) == {0} and "| C-I | 0 |" in data_card(manifest)
+
+
+def test_what_cannot_be_written_is_named_and_leaves_the_folder_usable(tmp_path, monkeypatch):
+    (tmp_path / "file").write_text("mine")
+    with pytest.raises(ConfigError, match="is no folder"):
+        generate(tmp_path / "file", ["A-I"], 10, workers=1)
+    with pytest.raises(InputFileError, match="cannot be written"):
+        write_atomically(tmp_path / "file" / "out", b"1")
+
+    def full(_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    (tmp_path / "kept").write_bytes(b"before")
+    with monkeypatch.context() as patched:
+        patched.setattr(os, "fsync", full)
+        with pytest.raises(InputFileError, match="No space left"):
+            write_atomically(tmp_path / "kept", b"after")
+    assert (tmp_path / "kept").read_bytes() == b"before" and not list(tmp_path.glob("*.part"))
+
+
+def test_a_generation_that_got_nowhere_can_go_on(tmp_path, monkeypatch):
+    def full(path, data):
+        raise InputFileError(path, "cannot be written (No space left on device)")
+
+    monkeypatch.setattr(generate_module, "make_shard", None)
+    monkeypatch.setattr(generate_module, "_fill", lambda folder, *rest: full(folder / "A-I", b""))
+    for _ in range(2):
+        with pytest.raises(InputFileError, match="No space left"):
+            generate(tmp_path / "data", ["A-I"], 10, workers=1)
+    assert verify(tmp_path / "data")["sets"] == {}
+
+
+def test_the_key_of_data_is_that_of_its_shards(folder):
+    manifest = read_manifest(folder)
+    key = content_key(manifest, ["B-II", "A-I-driven"])
+    assert key == content_key(manifest, ["A-I-driven", "B-II"]) != content_key(manifest, ["B-II"])
 
 
 def test_a_missing_set_is_named(folder):

@@ -1,12 +1,17 @@
 """A tiny network learns for real; a stopped training goes on as if it had not been stopped; what is bad is named."""
 
+import hashlib
 import json
+import math
+import shutil
 
 import numpy as np
 import pytest
 
 torch = pytest.importorskip("torch")
 pytest.importorskip("torch_geometric")
+
+from safetensors.torch import save  # noqa: E402
 
 from swarmscope.errors import ConfigError, InputFileError, SwarmscopeError  # noqa: E402
 from swarmscope.learning import checkpoints, export, models, train  # noqa: E402
@@ -23,7 +28,10 @@ from swarmscope.learning.evaluate import (  # noqa: E402
     share,
 )
 from swarmscope.learning.generate import generate  # noqa: E402
-from swarmscope.learning.records import load  # noqa: E402
+from swarmscope.learning.records import load, read_manifest, select, split_of, to_bytes, write_manifest  # noqa: E402
+from swarmscope.learning.scenes import robot  # noqa: E402
+from swarmscope.onboard.perception.local_map import CELL_DISTANCE  # noqa: E402
+from swarmscope.onboard.planning._giwt import draw  # noqa: E402
 
 SMALL = {"sets": ["A-II-driven"], "channels": [4, 8, 8], "batch": 32, "threads": 2, "precision": "float32"}
 
@@ -88,6 +96,45 @@ def test_a_loss_that_is_not_finite_stops_and_keeps_what_was_there(data, tmp_path
     assert (tmp_path / "last.safetensors").read_bytes() == kept
 
 
+def test_a_validation_that_is_not_finite_stops_and_keeps_what_was_there(data, tmp_path, monkeypatch):
+    short = {"samples_per_epoch": 100, "validation_samples": 50}
+    train.train(config(epochs=1, **short), data, tmp_path)
+    kept = (tmp_path / "last.safetensors").read_bytes()
+    monkeypatch.setattr(train, "evaluate", lambda *_: train.Scores(math.nan, 0.5, 1.0))
+    with pytest.raises(SwarmscopeError, match="loss is nan in the validation after epoch 2"):
+        train.train(config(epochs=2, **short), data, tmp_path)
+    assert (tmp_path / "last.safetensors").read_bytes() == kept
+
+
+def test_a_training_without_progress_ends_and_stays_ended(data, tmp_path, monkeypatch):
+    monkeypatch.setattr(train, "evaluate", lambda *_: train.Scores(0.5, 0.5, 1.0))
+    short = {"samples_per_epoch": 64, "validation_samples": 50, "patience": 2}
+    for _ in range(2):
+        assert len(train.train(config(epochs=9, **short), data, tmp_path)) == 3
+    assert len(train.train(config(epochs=9, **(short | {"patience": 3})), data, tmp_path)) == 4
+
+
+def test_another_training_does_not_go_on_in_the_same_folder(data, tmp_path):
+    short = {"samples_per_epoch": 64, "validation_samples": 50}
+    first, last = config(epochs=1, **short), tmp_path / "run" / "last.safetensors"
+    train.train(first, data, tmp_path / "run")
+    fewer = tmp_path / "fewer"
+    shutil.copytree(data, fewer)
+    manifest = read_manifest(fewer)
+    del manifest["sets"]["A-II-driven"]["shards"][-1]
+    write_manifest(fewer, manifest)
+    with pytest.raises(ConfigError, match="on other data"):
+        train.train(config(epochs=2, **short), fewer, tmp_path / "run")
+    with pytest.raises(ConfigError, match="another --init"):
+        train.train(config(epochs=2, **short), data, tmp_path / "run", last)
+    shutil.copy(tmp_path / "run" / "best.safetensors", last)
+    with pytest.raises(ConfigError, match="without its optimizer"):
+        train.train(config(epochs=2, **short), data, tmp_path / "run")
+    (tmp_path / "file").write_text("mine")
+    with pytest.raises(InputFileError, match="cannot be written"):
+        train.train(first, data, tmp_path / "file")
+
+
 def test_the_encoder_of_another_network_is_taken_over(data, tmp_path):
     short = {"samples_per_epoch": 64, "validation_samples": 50, "epochs": 1}
     train.train(config(network="cnn", **short), data, tmp_path / "cnn")
@@ -96,6 +143,72 @@ def test_the_encoder_of_another_network_is_taken_over(data, tmp_path):
     assert torch.allclose(a["model.encoder.linear.weight"], b["model.encoder.linear.weight"], atol=1e-5)
     with pytest.raises(ConfigError, match="another architecture"):
         train.train(config(channels=[4, 4, 4], **short), data, tmp_path / "no", tmp_path / "cnn" / "last.safetensors")
+
+
+def write_untrained(path, **variant):
+    chosen = config(**variant)
+    checkpoints.write(path, models.Chooser(train.architecture_of(chosen)), {"config": chosen.model_dump(mode="json")})
+    return path
+
+
+def test_an_export_that_answers_otherwise_or_has_no_place_leaves_everything_as_it_was(tmp_path, monkeypatch):
+    path = write_untrained(tmp_path / "model.safetensors", network="cnn")
+    (tmp_path / "file").write_text("mine")
+    with pytest.raises(InputFileError, match="cannot be written"):
+        export.export(path, tmp_path / "file")
+    monkeypatch.setattr(export, "compare", lambda *_: 1.0)
+    with pytest.raises(SwarmscopeError, match="differ by 1, not below"):
+        export.export(path, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_scores_of_another_network_do_not_get_into_a_card(tmp_path):
+    path, scores = write_untrained(tmp_path / "model.safetensors", network="cnn"), tmp_path / "scores.json"
+    row = {"label": "cnn", "sha256": checkpoints.sha256_of(path)}
+    complete = {"sets": {"A-I": {"networks": [row]}}, "mean_accuracy": {"cnn": 0.8}}
+    scores.write_text(json.dumps(complete))
+    assert export.read_scores(scores, path) == complete
+    row["sha256"] = "0" * 64
+    wrong = {
+        "no scores of": complete, "no complete scores": {"sets": complete["sets"]}, "complete scores": [1],
+        "another form": {"sets": {"A-I": 3}, "mean_accuracy": {}},
+    }  # fmt: skip
+    for words, values in wrong.items():
+        scores.write_text(json.dumps(values))
+        with pytest.raises(InputFileError, match=words):
+            export.read_scores(scores, path)
+    scores.write_text("{")
+    for place in (scores, tmp_path / "nowhere.json"):
+        with pytest.raises(InputFileError, match="cannot be read"):
+            export.read_scores(place, path)
+
+
+def test_an_interval_goes_by_map():
+    rng = np.random.default_rng(3)
+    maps = np.repeat(np.arange(100), 50)
+    alike = np.repeat(rng.random(100) < 0.7, 50)
+    together, alone = share(alike, maps), share(alike, np.arange(5000))
+    assert together.value == alone.value == pytest.approx(alike.mean())
+    assert together.maps == 100 and together.samples == 5000
+    half = 1.96 * math.sqrt(0.7 * 0.3 / 100)
+    assert together.high - together.low == pytest.approx(2.0 * half, rel=0.2)
+    assert together.high - together.low > 5.0 * (alone.high - alone.low)
+
+
+def test_a_split_without_samples_is_named(data, tmp_path):
+    none = tmp_path / "none"
+    shutil.copytree(data, none)
+    manifest = read_manifest(none)
+    entry = manifest["sets"]["A-II-driven"]
+    shard = load(none)["A-II-driven"]
+    part = to_bytes(select(shard, split_of(shard.map) == 0))
+    (none / entry["shards"][0]["file"]).write_bytes(part)
+    entry["shards"] = [entry["shards"][0] | {"sha256": hashlib.sha256(part).hexdigest()}]
+    write_manifest(none, manifest)
+    with pytest.raises(ConfigError, match="'A-II-driven' has no test samples"):
+        read_test(none, ["A-II-driven"])
+    with pytest.raises(ConfigError, match="no samples for training or for validation"):
+        train.train(config(), none, tmp_path / "run")
 
 
 VARIANTS = [{"network": n} for n in models.NETWORKS]
@@ -144,6 +257,28 @@ def test_a_mirrored_sample_is_the_sample_of_the_mirrored_world(data):
     assert np.array_equal(np.where(plain.present > 0, (6 - rows) * 7 + columns, 24), mirrored.cells)
 
 
+def test_a_picture_in_a_batch_is_what_the_planner_draws(data):
+    shard, rig = load(data)["A-II-driven"], robot()[2]
+    batch = make_batch(shard, np.arange(40), np.zeros(40, bool), FAR, VIEW)
+    picture = np.empty(batch.maps.shape[1:], np.float32)
+    for e, (scan, target) in enumerate(zip(shard.node_scan, shard.node_target, strict=True)):
+        if e == len(batch.maps):
+            break
+        draw(shard.codes[scan], float(target), 5.0, rig, picture)
+        assert np.array_equal(picture, batch.maps[e])
+    assert e == shard.first[40]
+
+
+def test_robots_that_see_less_far_have_less_in_their_pictures_and_gain_more(data):
+    shard = load(data)["A-II-driven"]
+    far, near = (make_batch(shard, np.arange(40), np.zeros(40, bool), np.full(40, s), VIEW) for s in (5.0, 2.0))
+    seen = CELL_DISTANCE * 0.1 <= 2.0 + 1e-6
+    assert np.array_equal(near.maps[:, :, seen], far.maps[:, :, seen]) and not near.maps[:, :, ~seen].any()
+    assert far.maps[:, :, ~seen].any()
+    others = far.present.astype(bool) & (far.cells != 24)
+    assert (near.gains[others] > far.gains[others]).all() and (near.gains[:, 0] == 0.0).all()
+
+
 def test_features_of_others_come_in_bytes_and_the_own_ones_exactly(data):
     shard = load(data)["A-II-driven"]
     batch = make_batch(shard, np.arange(40), np.zeros(40, bool), FAR, VIEW)
@@ -163,8 +298,25 @@ def test_bad_checkpoints_and_configurations_are_named(tmp_path):
     (tmp_path / "torn.safetensors").write_bytes(b"\x10\0\0\0\0\0\0\0{")
     with pytest.raises(InputFileError, match="no whole safetensors"):
         checkpoints.read(tmp_path / "torn.safetensors")
-    for values, what in (({"epoch": 3}, "unknown key"), ({"batch": 0}, "batch"), ({"sets": ["X"]}, "none of")):
+    wrong = (
+        ({"epoch": 3}, "unknown key"), ({"batch": 1}, "batch"), ({"sets": ["X"]}, "none of"), ({"sets": []}, "sets"),
+        ({"sets": "A-I"}, "sets"), ({"view_m": 50.0}, "view_m"), ({"learning_rate": math.nan}, "learning_rate"),
+    )  # fmt: skip
+    for values, what in wrong:
         with pytest.raises(ConfigError, match=what):
             parse_config(values, "mine.yaml")
+    whole = write_untrained(tmp_path / "whole.safetensors")
+    found = checkpoints.read(whole)
+    about = {"format": checkpoints.FORMAT, "version": checkpoints.VERSION, "about": {"config": {}}}
+    shape = {"network": "giwt", "channels": [4, 8, 8]}
+    headers = {
+        "is no 'swarmscope-giwt-checkpoint'": [], "of version 1": about | {"version": 2},
+        "what configuration": about | {"about": {}, "architecture": shape}, "another version": about,
+        "unknown network 'gpt'": about | {"architecture": shape | {"network": "gpt"}},
+    }  # fmt: skip
+    for words, header in headers.items():
+        whole.write_bytes(save(found.tensors, {"swarmscope": json.dumps(header)}))
+        with pytest.raises(InputFileError, match=words):
+            checkpoints.read(whole)
     with pytest.raises(InputFileError, match="packaged ones are cpu, full, tiny"):
         read_config(str(tmp_path / "mine.yaml"))

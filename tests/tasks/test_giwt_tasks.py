@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from swarmscope.errors import UnknownNameError
+from swarmscope.errors import ConfigError, UnknownNameError
 from swarmscope.sim.world import Circle, Polygon
-from swarmscope.tasks import giwt_1, giwt_2
+from swarmscope.tasks import giwt_1, giwt_2, giwt_lab
 from swarmscope.tasks._check import check_setup
 
 
@@ -45,3 +45,9 @@ def test_in_task_two_a_column_crosses():
     assert np.ptp(setup.starts[:, 0]) == 0.0 and np.ptp(setup.goals[:, 0]) == 0.0
     assert np.allclose(setup.starts[:, 1], setup.goals[:, 1])
     assert setup.goals[0, 0] - setup.starts[0, 0] == pytest.approx(18.7)
+
+
+@pytest.mark.parametrize("task", [giwt_1, giwt_2, giwt_lab])
+def test_fewer_obstacles_at_most_than_at_least_are_refused(task):
+    with pytest.raises(ConfigError, match=f"{task.NAME}: most: is 3, less than fewest, 4"):
+        task.make(5, fewest=4, most=3)

@@ -25,8 +25,9 @@ class PlainErrors(TyperGroup):
         except SwarmscopeError as error:
             typer.echo(f"swarmscope: {error}", err=True)
             raise typer.Exit(FAILED) from None
-        except KeyboardInterrupt:
-            typer.echo("swarmscope: stopped; nothing of the unfinished run was kept", err=True)
+        except KeyboardInterrupt as stop:
+            words = stop.args[0] if stop.args else "stopped; nothing of the unfinished run was kept"
+            typer.echo(f"swarmscope: {words}", err=True)
             raise typer.Exit(INTERRUPTED) from None
         except BrokenPipeError:
             _drop_output()

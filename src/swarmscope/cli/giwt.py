@@ -25,18 +25,15 @@ RADII_SAMPLES = 12_000
 
 def data_command(folder: Path, sets: Sequence[str], samples: int, workers: int | None, check: bool) -> None:
     """Bring a data folder to ``samples`` samples for each set, or check what is there; print a table."""
-    if check:
-        manifest = verify(folder)
-    else:
-        with _bar() as bar:
-            jobs: dict[str, Any] = {}
+    with _bar() as bar, _resumable("the same command goes on with the next shard"):
+        jobs: dict[str, Any] = {}
 
-            def report(name: str, done: int, wanted: int) -> None:
-                if name not in jobs:
-                    jobs[name] = bar.add_task(name, total=wanted, note="")
-                bar.update(jobs[name], completed=min(done, wanted), note=f"{done} of {wanted} samples")
+        def report(name: str, done: int, wanted: int) -> None:
+            if name not in jobs:
+                jobs[name] = bar.add_task(name, total=wanted, note="")
+            bar.update(jobs[name], completed=min(done, wanted), note=f"{done} of {wanted} samples")
 
-            manifest = generate(folder, expand(sets), samples, workers, report)
+        manifest = verify(folder, report) if check else generate(folder, expand(sets), samples, workers, report)
     table = Table(title=f"expert data in {folder}")
     columns = (
         "samples", "train", "validation", "test", "left", "maps", "looked_at", "unreachable", "nothing_ahead", "tie",
@@ -44,7 +41,7 @@ def data_command(folder: Path, sets: Sequence[str], samples: int, workers: int |
     for column in ("set", *columns, "neighbours"):
         table.add_column(column, justify="right")
     for name, row in totals(manifest).items():
-        table.add_row(name, *(str(row[c]) for c in columns), f"{row['neighbours'] / row['samples']:.2f}")
+        table.add_row(name, *(str(row[c]) for c in columns), f"{row['neighbours'] / max(1, row['samples']):.2f}")
     PlainConsole(width=None if sys.stdout.isatty() else 150).print(table)
     if check:
         print("all shards are there and have the checksums of the manifest")
@@ -67,7 +64,7 @@ def train_command(config: str, data: Path, out: Path | None, init: Path | None, 
 
     chosen = read_config(config, read_changes(changes))
     place = out or Path("runs") / "giwt" / chosen.network
-    with _bar() as bar:
+    with _bar() as bar, _resumable("the same command goes on after the last whole epoch"):
         job = bar.add_task(chosen.network, total=None, note="reads data")
 
         def report(epoch: int, done: int, steps: int, note: str) -> None:
@@ -97,57 +94,28 @@ def eval_command(
     pictures: Path | None,
 ) -> None:
     """Score trained networks on every set and compare the first with the others."""
-    _need("torch", "torch_geometric", "safetensors")
-    from swarmscope.learning.evaluate import (
-        ahead_of,
-        coin_regret,
-        data_key,
-        judge,
-        lost_on_the_radio,
-        majority,
-        open_trained,
-        read_test,
-        regret,
-        share,
-    )
+    _need("torch", "torch_geometric", "safetensors", *([] if pictures is None else ["sklearn"]))
+    from swarmscope.learning.evaluate import data_key, open_trained, read_test, share
     from swarmscope.learning.records import SPLITS
 
     if split not in SPLITS:
         raise ConfigError("--split", f"'{split}' is none of {', '.join(SPLITS)}")
+    if out is not None and out.is_dir():
+        raise ConfigError("--out", f"{out} is a folder, not a file to write")
     networks = _told_apart([open_trained(path) for path in runs])
-    shards = read_test(data, expand(sets), split)
-    result: dict[str, Any] = {"data": data_key(data, list(shards)), "split": split, "sets": {}}
-    everything: list[list[Any]] = [[] for _ in networks]
-    table = Table(title=f"accuracy on {split} maps, % (95 % interval over maps)")
-    for column in ("set", "samples", "majority", *(n.label for n in networks)):
-        table.add_column(column, justify="right")
+    radii = _checked_radii(radii, networks)
     with _bar() as bar:
-        job = bar.add_task("eval", total=len(networks) * sum(s.samples for s in shards.values()), note="")
-        for name, shard in shards.items():
-            verdicts = [judge(one, shard, lambda done: bar.advance(job, done)) for one in networks]
-            rows = []
-            for one, verdict in zip(networks, verdicts, strict=True):
-                row = {"label": one.label, "checkpoint": str(one.path), "accuracy": share(verdict.hit, verdict.map)}
-                row |= {"regret_m": regret(verdict), "first_ahead": ahead_of(verdicts[0], verdict)}
-                row |= {"lost_on_the_radio": lost_on_the_radio(verdict)}
-                rows.append({k: v._asdict() if hasattr(v, "_asdict") else v for k, v in row.items()})
-            for kept, verdict in zip(everything, verdicts, strict=True):
-                kept.append(verdict)
-            most = majority(shard)
-            about = {"samples": shard.samples, "majority": most, "coin_regret_m": coin_regret(shard)}
-            result["sets"][name] = about | {"networks": rows}
-            table.add_row(name, str(shard.samples), f"{100 * most:.1f}", *(_words(r["accuracy"]) for r in rows))
-            if out is not None:
-                _save(out, result)
+        bar.add_task("reads data", total=None, note="")
+        shards = read_test(data, expand(sets), split)
+    result: dict[str, Any] = {"data": data_key(data, list(shards)), "split": split, "sets": {}}
+    everything = _score_sets(networks, shards, result, out)
     means = [_mean(result, k) for k in range(len(networks))]
-    table.add_row("mean", "", "", *(f"{100 * value:.2f}" for value in means))
     joined = [[np.concatenate([getattr(v, part) for v in kept]) for part in ("hit", "map")] for kept in everything]
     result["whole"] = [share(hit, maps)._asdict() for hit, maps in joined]
     result["mean_accuracy"] = {one.label: value for one, value in zip(networks, means, strict=True)}
-    console = PlainConsole(width=None if sys.stdout.isatty() else 170)
-    console.print(table)
-    console.print(_difference_table(result, [one.label for one in networks]))
-    console.print(_regret_table(result, [one.label for one in networks]))
+    console, labels = PlainConsole(width=None if sys.stdout.isatty() else 170), [one.label for one in networks]
+    for table in (_accuracy_table, _difference_table, _regret_table):
+        console.print(table(result, labels))
     scores = _at_radii(networks, shards, radii, console) if radii else {}
     result["radii"] = {label: {f"{r:g}": s._asdict() for r, s in row.items()} for label, row in scores.items()}
     if out is not None:
@@ -157,14 +125,48 @@ def eval_command(
         _draw(pictures, networks, shards, scores)
 
 
+def _score_sets(
+    networks: Sequence[Any], shards: dict[str, Any], result: dict[str, Any], out: Path | None
+) -> list[list[Any]]:
+    """Score the networks set by set into ``result``, kept in ``out``; return each network's verdicts."""
+    from swarmscope.learning.evaluate import ahead_of, coin_regret, judge, lost_on_the_radio, majority, regret, share
+
+    everything: list[list[Any]] = [[] for _ in networks]
+    with _bar() as bar:
+        job = bar.add_task("eval", total=len(networks) * sum(s.samples for s in shards.values()), note="")
+        for name, shard in shards.items():
+            verdicts = [judge(one, shard, lambda done: bar.advance(job, done)) for one in networks]
+            rows = []
+            for one, kept, verdict in zip(networks, everything, verdicts, strict=True):
+                kept.append(verdict)
+                scores = {
+                    "accuracy": share(verdict.hit, verdict.map), "regret_m": regret(verdict),
+                    "first_ahead": ahead_of(verdicts[0], verdict), "lost_on_the_radio": lost_on_the_radio(verdict),
+                }  # fmt: skip
+                rows.append({"label": one.label, "sha256": one.sha256} | {k: s._asdict() for k, s in scores.items()})
+            about = {"samples": shard.samples, "majority": majority(shard), "coin_regret_m": coin_regret(shard)}
+            result["sets"][name] = about | {"networks": rows}
+            if out is not None:
+                _save(out, result)
+    return everything
+
+
 def _told_apart(networks: list[Any]) -> list[Any]:
-    """Return networks with labels of their own: those that share one get the name of their folder."""
+    """Return networks with labels of their own: those that share one get the name of their folder, or a number."""
     labels = [one.label for one in networks]
-    same = [labels.count(one.label) > 1 for one in networks]
-    return [
-        one._replace(label=f"{one.label} ({one.path.parent.name})") if twice else one
-        for one, twice in zip(networks, same, strict=True)
-    ]
+    folders = [f" ({one.path.resolve().parent.name})" for one in networks]
+    for added in (folders, [f" {k}" for k in range(1, len(networks) + 1)]):
+        labels = [text + more if labels.count(text) > 1 else text for text, more in zip(labels, added, strict=True)]
+    return [one._replace(label=label) for one, label in zip(networks, labels, strict=True)]
+
+
+def _checked_radii(radii: Sequence[float], networks: Sequence[Any]) -> list[float]:
+    """Return the radii in order, each once; raises ConfigError for one beyond what a network's pictures show."""
+    for one in networks:
+        for radius in radii:
+            if not radius <= one.config.view_m:
+                raise ConfigError("--radius", f"{radius:g} m: the pictures of {one.label} show {one.config.view_m:g} m")
+    return sorted(set(radii))
 
 
 def _at_radii(networks: Sequence[Any], shards: dict[str, Any], radii: Sequence[float], console: Console) -> Any:
@@ -212,7 +214,9 @@ def ceiling_command(data: Path, sets: Sequence[str], view_m: float) -> None:
     from swarmscope.learning.evaluate import read_test
 
     names = expand(sets)
-    training, test = (read_test(data, names, split) for split in ("train", "test"))
+    with _bar() as bar:
+        bar.add_task("reads data", total=None, note="")
+        training, test = (read_test(data, names, split) for split in ("train", "test"))
     table = Table(title=f"pairs of test and training samples that look alike within {view_m:g} m: sides that differ, %")
     table.add_column("set", justify="right")
     with _bar() as bar:
@@ -230,11 +234,14 @@ def ceiling_command(data: Path, sets: Sequence[str], view_m: float) -> None:
 def export_command(run: Path, out: Path, scores: Path | None) -> None:
     """Write what a robot runs."""
     _need("torch", "torch_geometric", "safetensors", "onnx", "onnxruntime")
-    from swarmscope.learning.export import export
+    from swarmscope.learning.export import export, read_scores
     from swarmscope.learning.train import BEST
 
-    card = {} if scores is None else {"scores": json.loads(scores.read_text(encoding="utf-8"))}
-    difference = export(run / BEST if run.is_dir() else run, out, card)
+    checkpoint = run / BEST if run.is_dir() else run
+    card = {} if scores is None else {"scores": read_scores(scores, checkpoint)}
+    with _bar() as bar:
+        bar.add_task("export", total=None, note="")
+        difference = export(checkpoint, out, card)
     print(f"{out}: ONNX Runtime and PyTorch differ by at most {difference:.1e}")
 
 
@@ -278,6 +285,17 @@ def _mean(result: dict[str, Any], k: int) -> float:
     return float(sum(values) / len(values))
 
 
+def _accuracy_table(result: dict[str, Any], labels: list[str]) -> Table:
+    table = Table(title=f"accuracy on {result['split']} maps, % (95 % interval over maps)")
+    for column in ("set", "samples", "majority", *labels):
+        table.add_column(column, justify="right")
+    for name, entry in result["sets"].items():
+        words = (_words(row["accuracy"]) for row in entry["networks"])
+        table.add_row(name, str(entry["samples"]), f"{100 * entry['majority']:.1f}", *words)
+    table.add_row("mean", "", "", *(f"{100 * result['mean_accuracy'][label]:.2f}" for label in labels))
+    return table
+
+
 def _difference_table(result: dict[str, Any], labels: list[str]) -> Table:
     table = Table(title=f"{labels[0]} minus the others, and its features exact minus in bytes: percentage points")
     for column in ("set", *labels[1:], "bytes"):
@@ -299,6 +317,15 @@ def _regret_table(result: dict[str, Any], labels: list[str]) -> Table:
         lost = [row["regret_m"]["value"] for row in entry["networks"]]
         table.add_row(name, f"{coin:.3f}", *(f"{value:.3f} ({100 * (1 - value / coin):.1f} %)" for value in lost))
     return table
+
+
+@contextmanager
+def _resumable(how: str) -> Iterator[None]:
+    """Say on Ctrl-C how to go on."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(f"stopped; {how}") from None
 
 
 @contextmanager

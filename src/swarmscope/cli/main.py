@@ -358,7 +358,8 @@ def giwt_data(
     "train",
     epilog="Examples:\n\n"
     "[bold]swarmscope giwt train[/bold]\n\n"
-    "[bold]swarmscope giwt train full --set network=gat --init runs/giwt/cnn/best.safetensors[/bold]\n\n"
+    "[bold]swarmscope giwt train --set network=gat --init runs/giwt/cnn/best.safetensors[/bold]\n\n"
+    "[bold]swarmscope giwt train full --data /mnt/giwt --out runs/giwt/full --set batch=512[/bold]\n\n"
     "[bold]swarmscope giwt train mine.yaml --out runs/giwt/mine[/bold]",
 )
 def giwt_train(
@@ -378,7 +379,9 @@ def giwt_train(
 
 @giwt.command(
     "eval",
-    epilog="Example: [bold]swarmscope giwt eval runs/giwt/giwt runs/giwt/gat runs/giwt/cnn --out scores.json[/bold]",
+    epilog="Examples:\n\n"
+    "[bold]swarmscope giwt eval runs/giwt/giwt runs/giwt/gat runs/giwt/cnn --out runs/giwt/scores.json[/bold]\n\n"
+    "[bold]swarmscope giwt eval runs/giwt/giwt --set-of driven --radius 2.5 --radius 5 --pictures runs/giwt[/bold]",
 )
 def giwt_eval(
     runs: Annotated[
@@ -399,11 +402,11 @@ def giwt_eval(
     eval_command(runs, data, set_of or ["placed"], split, radius or [], out, pictures)
 
 
-@giwt.command("ceiling", epilog="Example: [bold]swarmscope giwt ceiling --set-of driven --view 5[/bold]")
+@giwt.command("ceiling", epilog="Example: [bold]swarmscope giwt ceiling --set-of driven --view 2.5[/bold]")
 def giwt_ceiling(
     data: GiwtData = Path("runs/giwt/data"),
     set_of: GiwtSets = None,
-    view: Annotated[float, typer.Option(min=0.1, help="Radius seen, metres.")] = 2.5,
+    view: Annotated[float, typer.Option(min=0.1, help="Radius seen, metres.")] = 5.0,
 ) -> None:
     """Show how often the expert's sides differ between samples that look alike."""
     from swarmscope.cli.giwt import ceiling_command
@@ -411,7 +414,10 @@ def giwt_ceiling(
     ceiling_command(data, set_of or ["placed"], view)
 
 
-@giwt.command("export", epilog="Example: [bold]swarmscope giwt export runs/giwt/giwt runs/giwt/model[/bold]")
+@giwt.command(
+    "export",
+    epilog="Example: [bold]swarmscope giwt export runs/giwt/giwt runs/giwt/model --scores runs/giwt/scores.json[/bold]",
+)
 def giwt_export(
     run: Annotated[Path, typer.Argument(help="Run folder or checkpoint.")],
     out: Annotated[Path, typer.Argument(help="Folder of the model.")],

@@ -26,7 +26,7 @@ from swarmscope.evaluation.provenance import git_revision, versions
 from swarmscope.evaluation.run_folder import check_out, write_run
 from swarmscope.evaluation.scenario import Scenario, complete, make_setting, make_setup
 from swarmscope.evaluation.shortest_path import any_angle_paths, grid_paths, lengths_m
-from swarmscope.evaluation.sides import make_advice
+from swarmscope.evaluation.sides import judged_by, make_advice
 from swarmscope.onboard.planning._contract import REASON_NAMES, STATE_NAMES
 from swarmscope.sim.loop import Setting, Trace, run
 from swarmscope.tasks import Setup
@@ -77,9 +77,7 @@ def play(
     setup = make_setup(scenario)
     setting = make_setting(scenario, setup, threads)
     if scenario.judge_sides or getattr(setting.planner, "TOLD_SIDE", False):
-        keeps_off = scenario.robot.radius_m + scenario.safety.margin_m
-        horizon = max(setting.rig.look_ahead, setting.rig.protection.l_th) + setting.rig.body.radius
-        setting = replace(setting, advice=make_advice(setup, keeps_off, horizon))
+        setting = replace(setting, advice=make_advice(setup, *judged_by(scenario, setting.rig)))
     trace = run(setting, progress)
     if references is None:
         references = find_references(scenario, setup, any_angle)

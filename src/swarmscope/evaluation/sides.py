@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarmscope._jit import jit_alloc as jit
+from swarmscope.evaluation.scenario import Scenario
 from swarmscope.evaluation.shortest_path import RESOLUTION_M, SNAP_CELLS
+from swarmscope.onboard.percept import Rig
 from swarmscope.sim.advice import Advice
 from swarmscope.sim.world import compile_world
 from swarmscope.tasks import Setup
@@ -17,6 +19,15 @@ from swarmscope.tasks._search import SQRT2
 
 MOST_FIELDS = 200
 """More robots than this would take gigabytes."""
+
+
+def judged_by(scenario: Scenario, rig: Rig) -> tuple[float, float]:
+    """Return what shortest ways keep off obstacles, and within what distance these must begin to be worth a side [m].
+
+    The first is the robot's radius and margin; the second its own horizon, from its centre on.
+    """
+    horizon_m = max(rig.look_ahead, rig.protection.l_th) + rig.body.radius
+    return scenario.robot.radius_m + scenario.safety.margin_m, horizon_m
 
 
 def make_advice(

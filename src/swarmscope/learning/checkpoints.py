@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from dataclasses import asdict
 from pathlib import Path
@@ -13,7 +14,7 @@ from safetensors.torch import save
 from torch import Tensor, nn
 
 from swarmscope.errors import ConfigError, InputFileError
-from swarmscope.learning.models import Architecture, Chooser
+from swarmscope.learning.models import NETWORKS, Architecture, Chooser
 from swarmscope.learning.records import write_atomically
 
 FORMAT = "swarmscope-giwt-checkpoint"
@@ -50,13 +51,31 @@ def read(path: Path) -> Checkpoint:
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - not a mapping
     except (SafetensorError, OSError, ValueError) as error:
         raise InputFileError(path, f"is no whole safetensors file ({error})") from None
-    if header.get("format") != FORMAT or header.get("version") != VERSION:
+    if not isinstance(header, dict) or header.get("format") != FORMAT or header.get("version") != VERSION:
         raise InputFileError(path, f"is no '{FORMAT}' of version {VERSION}")
-    shape = header["architecture"] | {"channels": tuple(header["architecture"]["channels"])}
+    about = header.get("about")
+    if not isinstance(about, dict) or not isinstance(about.get("config"), dict):
+        raise InputFileError(path, "does not say what configuration it was trained with")
+    return Checkpoint(_architecture(header.get("architecture"), path), about, tensors)
+
+
+def _architecture(values: Any, path: Path) -> Architecture:
+    """Return the architecture that a header describes."""
     try:
-        return Checkpoint(Architecture(**shape), header["about"], tensors)
-    except TypeError as error:
+        found = Architecture(**(values | {"channels": tuple(values["channels"])}))
+    except (TypeError, KeyError) as error:
         raise InputFileError(path, f"its architecture is of another version ({error})") from None
+    if found.network not in NETWORKS:
+        raise InputFileError(path, f"unknown network {found.network!r} (valid: {', '.join(NETWORKS)})")
+    return found
+
+
+def sha256_of(path: Path) -> str:
+    """Return the SHA-256 of a checkpoint; raises InputFileError when it cannot be read."""
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError as error:
+        raise InputFileError(path, f"cannot be read ({error.strerror})") from None
 
 
 def restore_model(found: Checkpoint, path: Path) -> Chooser:
@@ -84,11 +103,13 @@ def expect(found: Checkpoint, wanted: Architecture, path: Path) -> None:
             raise ConfigError(str(path), f"is of another architecture: {key} is {other}, not {value}")
 
 
-def restore_optimizer(optimizer: torch.optim.Optimizer, found: Checkpoint) -> None:
-    """Load the state of an optimizer of the same parameters."""
+def restore_optimizer(optimizer: torch.optim.Optimizer, found: Checkpoint, path: Path) -> None:
+    """Load the state of an optimizer of the same parameters; raises ConfigError when it is not there."""
     state: dict[int, dict[str, Tensor]] = {}
     for name, value in found.tensors.items():
         if name.startswith("optimizer."):
             _, index, key = name.split(".", 2)
             state.setdefault(int(index), {})[key] = value
+    if not state:
+        raise ConfigError(str(path), "holds a network without its optimizer: training cannot go on from it")
     optimizer.load_state_dict({"state": state, "param_groups": optimizer.state_dict()["param_groups"]})

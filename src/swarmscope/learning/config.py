@@ -10,12 +10,12 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from swarmscope.errors import ConfigError, InputFileError
 from swarmscope.learning.generate import DRIVEN, PLACED, parse_set
+from swarmscope.onboard.planning._giwt_network import VIEWS_M
 
 FOLDER = Path(__file__).parent.parent / "data" / "training"
 Count = Annotated[int, Field(ge=1)]
 NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
-NETWORKS = ("giwt", "gat", "graphsage", "cnn")
 
 
 class TrainingConfig(BaseModel):
@@ -24,7 +24,7 @@ class TrainingConfig(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     network: Literal["giwt", "gat", "graphsage", "cnn"] = "giwt"
-    sets: list[str] = [*PLACED, *DRIVEN]
+    sets: Annotated[list[str], Field(min_length=1)] = [*PLACED, *DRIVEN]
     """Sets of the data folder, by name."""
     channels: tuple[Count, Count, Count] = (16, 32, 64)
     stem_stride: Literal[1, 2] = 2
@@ -33,7 +33,7 @@ class TrainingConfig(BaseModel):
     as_printed: bool = False
     """giwt: nothing beyond (4)-(9), see learning/models.py."""
     dropout: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.0
-    view_m: Positive = 5.0
+    view_m: Annotated[float, Field(ge=VIEWS_M[0], le=VIEWS_M[1])] = 5.0
     """Radius of the pictures: the range of the sensor; the document has 2.5 m."""
     shorter: Annotated[float, Field(ge=0.0, le=1.0)] = 0.25
     """Share of the training samples in which robots see less far, 1 m to view_m: for sensors of a shorter range."""
@@ -41,7 +41,7 @@ class TrainingConfig(BaseModel):
     samples_per_epoch: Count = 60_000
     """Drawn anew for every epoch; all of the training data if it holds fewer."""
     validation_samples: Count = 20_000
-    batch: Count = 256
+    batch: Annotated[int, Field(ge=2)] = 256
     learning_rate: Positive = 1e-3
     weight_decay: NotNegative = 1e-2
     warm_up: NotNegative = 0.5

@@ -16,6 +16,7 @@ import torch
 from numpy.typing import NDArray
 
 from swarmscope._jit import jit
+from swarmscope.errors import ConfigError
 from swarmscope.learning import checkpoints
 from swarmscope.learning.batches import Batch, batches
 from swarmscope.learning.config import TrainingConfig, parse_config
@@ -25,9 +26,6 @@ from swarmscope.learning.train import BEST, autocast, decide, encode, place, set
 from swarmscope.onboard.planning._giwt_graph import quantise, restore
 
 RESAMPLES = 2000
-Floats = NDArray[np.float64]
-Report = Callable[[str, int, int], None]
-"""Called with what is scored, samples done and samples in all."""
 
 
 class Trained(NamedTuple):
@@ -37,6 +35,8 @@ class Trained(NamedTuple):
     path: Path
     config: TrainingConfig
     model: Chooser
+    sha256: str
+    """Of the checkpoint."""
 
 
 class Verdict(NamedTuple):
@@ -74,13 +74,17 @@ def open_trained(path: Path) -> Trained:
         without = [w for w, used in (("beta", config.use_gain), ("positions", config.use_position)) if not used]
         label += f" without {' and '.join(without)}" if without else ""
         label += " as printed" if config.as_printed else ""
-    return Trained(label, file, config, checkpoints.restore_model(found, file))
+    return Trained(label, file, config, checkpoints.restore_model(found, file), checkpoints.sha256_of(file))
 
 
 def read_test(data: Path, names: list[str], split: str = "test") -> dict[str, Shard]:
-    """Return one split of each set."""
+    """Return one split of each set; raises ConfigError when a set has nothing of it."""
     whole = load(data, names)
-    return {name: select(shard, split_of(shard.map) == SPLITS.index(split)) for name, shard in whole.items()}
+    found = {name: select(shard, split_of(shard.map) == SPLITS.index(split)) for name, shard in whole.items()}
+    for name, shard in found.items():
+        if not shard.samples:
+            raise ConfigError(str(data), f"set '{name}' has no {split} samples; generate more")
+    return found
 
 
 def data_key(data: Path, names: list[str]) -> str:
@@ -109,8 +113,6 @@ def judge(
         parts.append((exact, received))
         if report is not None:
             report(len(batch.right))
-    if not parts:
-        parts.append((np.zeros(0, np.float32), np.zeros(0, np.float32)))
     p_left, p_sent = (np.concatenate(part) for part in zip(*parts, strict=True))
     left = data.side > 0
     return Verdict((p_left > 0.5) == left, (p_sent > 0.5) == left, p_left, data.map, data.detour_m)
@@ -136,8 +138,6 @@ def through_bytes(features: np.ndarray, chosen: np.ndarray, codes: np.ndarray) -
 
 def share(values: NDArray[np.float64] | NDArray[np.bool_], maps: NDArray[np.int64]) -> Score:
     """Return the mean of ``values (n,)`` with its interval over maps."""
-    if not len(values):
-        return Score(math.nan, math.nan, math.nan, 0, 0)
     _, index = np.unique(maps, return_inverse=True)
     total, count = np.bincount(index, values.astype(np.float64)), np.bincount(index)
     rng = np.random.default_rng(0)

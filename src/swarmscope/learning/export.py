@@ -19,14 +19,15 @@ import torch
 from torch import Tensor, nn
 from torch_geometric.nn import GATConv, SAGEConv
 
-from swarmscope.errors import MissingExtraError, SwarmscopeError
-from swarmscope.learning.checkpoints import Checkpoint, read, restore_model
+from swarmscope.errors import InputFileError, MissingExtraError, SwarmscopeError
+from swarmscope.learning.checkpoints import Checkpoint, read, restore_model, sha256_of
+from swarmscope.learning.config import parse_config
 from swarmscope.learning.models import FAR_BELOW, SLOPE, Chooser, Peer
 from swarmscope.learning.records import write_atomically
 from swarmscope.onboard.perception.local_map import CELLS, CHANNELS
 from swarmscope.onboard.planning._giwt_graph import FEATURES, GRID, OWN_CELL
+from swarmscope.onboard.planning._giwt_network import CARD, DECIDER, ENCODER, FORMAT, VERSION
 
-FORMAT, VERSION = "swarmscope-giwt", 1
 OPSET = 18
 CLOSE = 1e-4
 """Largest difference between PyTorch and ONNX Runtime that is let pass."""
@@ -74,7 +75,8 @@ class StarPeer(nn.Module):
 def export(checkpoint: Path, out: Path, card: dict[str, Any] | None = None) -> float:
     """Write the model of ``checkpoint`` to folder ``out``; return the largest difference to PyTorch on random inputs.
 
-    ``card`` is added to ``model.json`` (scores of ``eval``). Raises SwarmscopeError when the difference is above CLOSE.
+    ``card`` is added to ``model.json`` (scores of ``eval``). Raises SwarmscopeError when the difference is above CLOSE;
+    then nothing is written.
     """
     try:
         import onnx  # noqa: F401
@@ -85,30 +87,48 @@ def export(checkpoint: Path, out: Path, card: dict[str, Any] | None = None) -> f
     features = torch.zeros(2, 3, FEATURES)
     row = torch.zeros(2, 3, dtype=torch.int64)
     files = {
-        "encoder.onnx": _to_onnx(
+        ENCODER: _to_onnx(
             model.encoder, (torch.zeros(2, CHANNELS, CELLS, CELLS),), ["maps"], "features", {0: "batch"}
         ),
-        "decider.onnx": _to_onnx(
+        DECIDER: _to_onnx(
             _Decider(model), (features, row, row.float(), torch.ones(2, 3)),
             ["features", "cells", "gains", "present"], "logits", {0: "batch", 1: "robots"},
         ),
     }  # fmt: skip
+    about = _about(found, files, checkpoint, card or {})
+    difference = compare(model, files)
+    if not difference <= CLOSE:
+        raise SwarmscopeError(f"{checkpoint}: ONNX Runtime and PyTorch differ by {difference:.2g}, not below {CLOSE:g}")
     for name, data in files.items():
         write_atomically(out / name, data)
-    write_atomically(out / "model.json", _about(found, files, card or {}))
-    difference = compare(model, out)
-    if not difference <= CLOSE:
-        raise SwarmscopeError(f"{out}: ONNX Runtime and PyTorch differ by {difference:.2g}, more than {CLOSE:g}")
+    write_atomically(out / CARD, about)
     return difference
 
 
-def _about(found: Checkpoint, files: dict[str, bytes], card: dict[str, Any]) -> bytes:
+def read_scores(path: Path, checkpoint: Path) -> dict[str, Any]:
+    """Return what ``eval`` wrote to ``path``; raises InputFileError unless it is complete and of ``checkpoint``."""
+    try:
+        scores = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputFileError(path, f"cannot be read ({error})") from None
+    if not isinstance(scores, dict) or not isinstance(scores.get("sets"), dict) or "mean_accuracy" not in scores:
+        raise InputFileError(path, "holds no complete scores of 'swarmscope giwt eval'")
+    try:
+        known = {row.get("sha256") for entry in scores["sets"].values() for row in entry["networks"]}
+    except (TypeError, KeyError, AttributeError):
+        raise InputFileError(path, "holds scores of another form") from None
+    if None not in known and sha256_of(checkpoint) not in known:
+        raise InputFileError(path, f"holds no scores of {checkpoint}: run 'swarmscope giwt eval' again")
+    return scores
+
+
+def _about(found: Checkpoint, files: dict[str, bytes], checkpoint: Path, card: dict[str, Any]) -> bytes:
     about = {
         "format": FORMAT,
         "version": VERSION,
         "network": found.architecture.network,
         "files": {name: hashlib.sha256(data).hexdigest() for name, data in files.items()},
-        "view_m": found.about["config"]["view_m"],
+        "view_m": parse_config(found.about["config"], str(checkpoint)).view_m,
         "parameters": int(sum(v.numel() for k, v in found.tensors.items() if k.startswith("model."))),
         "training": {k: found.about[k] for k in ("config", "versions", "git", "init", "data") if k in found.about},
         "history": found.about.get("history", []),
@@ -131,15 +151,15 @@ def _to_onnx(
     return out.getvalue()
 
 
-def compare(model: Chooser, folder: Path) -> float:
-    """Return the largest difference of features and logits between ``model`` and the files in ``folder``."""
+def compare(model: Chooser, files: dict[str, bytes]) -> float:
+    """Return the largest difference of features and logits between ``model`` and its two ONNX files."""
     import onnxruntime
 
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = 1
     encoder, decider = (
-        onnxruntime.InferenceSession(str(folder / name), options, providers=["CPUExecutionProvider"])
-        for name in ("encoder.onnx", "decider.onnx")
+        onnxruntime.InferenceSession(files[name], options, providers=["CPUExecutionProvider"])
+        for name in (ENCODER, DECIDER)
     )
     rng = np.random.default_rng(0)
     worst = 0.0

@@ -10,6 +10,7 @@ import torch
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from swarmscope.errors import ConfigError
 from swarmscope.learning.batches import make_batch
 from swarmscope.learning.evaluate import Score, Trained
 from swarmscope.learning.records import Shard
@@ -17,7 +18,7 @@ from swarmscope.learning.train import view_of
 
 LAYERS = ("input", "encoder", "graph layer", "final layer")
 LEFT, RIGHT = "#2166ac", "#b2182b"
-POINTS = 2000
+POINTS, FEWEST = 2000, 200
 DPI = 120
 
 
@@ -52,6 +53,8 @@ def tsne_png(trained: Trained, data: Shard) -> bytes:
     from sklearn.decomposition import PCA
     from sklearn.manifold import TSNE
 
+    if data.samples < FEWEST:
+        raise ConfigError("--pictures", f"a picture of the layers needs {FEWEST} samples or more, not {data.samples}")
     found, classes = layers(trained, data)
     figure = Figure(figsize=(13, 3.7), layout="constrained")
     axes: Any = figure.subplots(1, len(LAYERS))

@@ -81,12 +81,14 @@ def generate(
 ) -> dict[str, Any]:
     """Bring the sets ``names`` in ``folder`` to at least ``samples`` samples each; return the manifest.
 
-    Shards that are there already are kept. Raises ConfigError when the folder was made by another state of the rules.
+    Shards that are there already are kept, whatever state of the rules they were made by. Raises ConfigError when the
+    folder holds something else.
     """
     chosen = [parse_set(name) for name in names]
     if samples < 1:
         raise ConfigError("samples", f"must be at least 1, not {samples}")
     manifest = _open(folder)
+    write_manifest(folder, manifest)
     workers = workers or len(os.sched_getaffinity(0))
     pool = ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), initializer=start_worker)
     try:
@@ -105,8 +107,9 @@ def _open(folder: Path) -> dict[str, Any]:
     """Return the manifest of a folder that may be new."""
     if (folder / MANIFEST).exists():
         return read_manifest(folder)
-    if folder.exists() and any(folder.iterdir()):
-        raise ConfigError(str(folder), "is not empty and has no manifest; name another folder")
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        why = "is not empty and has no manifest" if folder.is_dir() else "is no folder"
+        raise ConfigError(str(folder), f"{why}; name another folder")
     schema = {name: f"{kind}, {dimensions} dimension(s)" for name, (kind, dimensions) in SCHEMA.items()}
     about = {"format": FORMAT, "version": VERSION, "schema": schema, "versions": versions(), "git": git_revision()}
     return about | {"sets": {}}
@@ -160,12 +163,16 @@ def make_shard(one: SetName, index: int) -> tuple[bytes, dict[str, Any]]:
     return to_bytes(shard), about
 
 
-def verify(folder: Path) -> dict[str, Any]:
+def verify(folder: Path, report: Report | None = None) -> dict[str, Any]:
     """Check every shard of a folder against its manifest; return the manifest."""
     manifest = read_manifest(folder)
-    for entry in manifest["sets"].values():
-        for shard in entry["shards"]:
+    for name, row in totals(manifest).items():
+        done = 0
+        for shard in manifest["sets"][name]["shards"]:
             read_shard(folder / shard["file"], shard["sha256"])
+            done += shard["samples"]
+            if report is not None:
+                report(name, done, row["samples"])
     return manifest
 
 
@@ -173,7 +180,7 @@ def totals(manifest: dict[str, Any]) -> dict[str, dict[str, int]]:
     """Return the sums over the shards of each set."""
     summed = {}
     for name, entry in manifest["sets"].items():
-        row: dict[str, int] = {}
+        row: dict[str, int] = dict.fromkeys(("samples", "left", "neighbours", "scans", "maps", *SPLITS, *Counts()), 0)
         for shard in entry["shards"]:
             numbers = {k: shard[k] for k in ("samples", "left", "neighbours", "scans", "maps")}
             for key, value in (numbers | shard["splits"] | shard["counts"]).items():

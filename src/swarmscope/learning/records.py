@@ -12,7 +12,9 @@ import io
 import json
 import os
 import zipfile
+import zlib
 from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -39,6 +41,13 @@ SCHEMA: dict[str, tuple[str, int]] = {
     "map": ("int64", 1),  # (n,) the map's seed; splits go by it
     "place": ("float32", 2),  # (n, 4) robot x, y, goal x, y, world frame [m]; to look at, not to learn from
 }
+HEAD: dict[str, type] = {"sets": dict, "schema": dict, "versions": dict, "git": str}
+"""What the manifest says of the folder, besides format and version."""
+ENTRY: dict[str, type] = {
+    "file": str, "sha256": str, "samples": int, "left": int, "scans": int, "neighbours": int, "first_map": int,
+    "maps": int, "splits": dict, "counts": dict,
+}  # fmt: skip
+"""What the manifest says of a shard."""
 SPLITS = ("train", "validation", "test")
 SPLIT_OF = np.array([0, 0, 0, 1, 2])
 """3:1:1 by map: the split of a map is that of its seed modulo 5."""
@@ -151,7 +160,7 @@ def read_shard(path: Path, sha256: str | None = None) -> Shard:
                 arrays[name] = file[name]
                 if arrays[name].dtype != kind or arrays[name].ndim != dimensions:
                     raise InputFileError(path, f"'{name}' is not {kind} with {dimensions} dimension(s)")
-    except (ValueError, KeyError, EOFError, zipfile.BadZipFile, OSError) as error:
+    except (ValueError, TypeError, KeyError, EOFError, zipfile.BadZipFile, zlib.error, OSError) as error:
         raise InputFileError(path, f"is no shard of version {VERSION} ({error})") from None
     shard = Shard(**arrays)
     _check_indices(path, shard)
@@ -163,7 +172,9 @@ def _check_indices(path: Path, shard: Shard) -> None:
     n, e = shard.samples, len(shard.node_scan)
     per_sample = (shard.detour_m, shard.way_m, shard.goal_m, shard.map, shard.place)
     per_node = (shard.node_target, shard.node_x, shard.node_y)
-    if any(len(a) != n for a in per_sample) or any(len(a) != e for a in per_node) or len(shard.first) != n + 1:
+    widths = shard.place.shape[1] == 4 and (e == 0 or shard.codes.shape[1] > 0)
+    fit = all(len(a) == n for a in per_sample) and all(len(a) == e for a in per_node) and len(shard.first) == n + 1
+    if not (widths and fit):
         raise InputFileError(path, "its arrays have lengths that do not fit together")
     in_order = shard.first[0] == 0 and shard.first[-1] == e and bool((np.diff(shard.first) >= 1).all())
     in_range = e == 0 or (shard.node_scan.min() >= 0 and shard.node_scan.max() < len(shard.codes))
@@ -173,16 +184,17 @@ def _check_indices(path: Path, shard: Shard) -> None:
 
 def write_atomically(path: Path, data: bytes) -> None:
     """Write a file that is there whole or not at all."""
-    path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(path.name + ".part")
     try:
+        path.parent.mkdir(parents=True, exist_ok=True)
         with part.open("wb") as file:
             file.write(data)
             file.flush()
             os.fsync(file.fileno())
         part.replace(path)
     except OSError as error:
-        part.unlink(missing_ok=True)
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
         raise InputFileError(path, f"cannot be written ({error.strerror})") from None
 
 
@@ -205,7 +217,23 @@ def read_manifest(folder: Path) -> dict[str, Any]:
         raise InputFileError(path, f"is not the manifest of a '{FORMAT}' folder")
     if manifest.get("version") != VERSION:
         raise InputFileError(path, f"has version {manifest.get('version')!r}; this program reads version {VERSION}")
+    _check_entries(path, manifest)
     return manifest
+
+
+def _check_entries(path: Path, manifest: dict[str, Any]) -> None:
+    """Raise InputFileError unless the manifest says of every shard of every set what ENTRY lists."""
+    for key, kind in HEAD.items():
+        if not isinstance(manifest.get(key), kind):
+            raise InputFileError(path, f"'{key}' is missing or of another kind")
+    for name, entry in manifest["sets"].items():
+        shards = entry.get("shards") if isinstance(entry, dict) else None
+        if not isinstance(shards, list):
+            raise InputFileError(path, f"set '{name}' has no list of shards")
+        for k, shard in enumerate(shards):
+            for key, kind in ENTRY.items():
+                if not isinstance(shard, dict) or not isinstance(shard.get(key), kind):
+                    raise InputFileError(path, f"'{key}' of shard {k} of set '{name}' is missing or of another kind")
 
 
 def content_key(manifest: dict[str, Any], names: Iterable[str]) -> str:

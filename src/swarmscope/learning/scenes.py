@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarmscope.evaluation.scenario import Scenario, make_rig_of, make_setting, parse_scenario
+from swarmscope.evaluation.sides import judged_by
 from swarmscope.learning.labels import LABELLED, OUTCOMES, Label, label
 from swarmscope.learning.views import look
 from swarmscope.onboard.percept import Rig
@@ -89,8 +90,7 @@ def robot() -> tuple[Scenario, Beams, Rig, float, float]:
     scenario = parse_scenario({"task": {"name": "GIWT_2"}, "planner": {"name": "dh-bug"}, "limit_s": LIMIT_S}, "data")
     lidar, rig = scenario.lidar, make_rig_of(scenario)
     beams = make_beams(lidar.beams, math.radians(lidar.fov_deg), lidar.range_m)
-    horizon = max(rig.look_ahead, rig.protection.l_th) + rig.body.radius
-    return scenario, beams, rig, scenario.robot.radius_m + scenario.safety.margin_m, horizon
+    return scenario, beams, rig, *judged_by(scenario, rig)
 
 
 def samples_of(kind: str, task: str, sampling: Sampling, seed: int, counts: Counts) -> Iterator[Sample]:

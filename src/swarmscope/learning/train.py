@@ -6,12 +6,12 @@ had happened.
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple, cast
 
@@ -20,7 +20,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from swarmscope.errors import ConfigError, SwarmscopeError
+from swarmscope.errors import ConfigError, InputFileError, SwarmscopeError
 from swarmscope.evaluation.provenance import git_revision, versions
 from swarmscope.learning import checkpoints
 from swarmscope.learning.batches import Batch, View, batches
@@ -88,21 +88,26 @@ def train(
     if init is not None:
         checkpoints.fill(model.encoder, "model.encoder.", checkpoints.read(init), init)
     optimizer = torch.optim.AdamW(model.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay)
-    history = _resume(config, out, model, optimizer)
     training, validation = read_splits(config, data)
-    out.mkdir(parents=True, exist_ok=True)
+    about: dict[str, Any] = {
+        "config": config.model_dump(mode="json"), "versions": all_versions(), "git": git_revision(),
+        "init": None if init is None else checkpoints.sha256_of(init),
+        "data": content_key(read_manifest(data), config.sets),
+    }  # fmt: skip
+    history = _resume(about, out, model, optimizer)
     write_atomically(out / "config.json", (config.model_dump_json(indent=1) + "\n").encode())
     board = _Board(out / "tensorboard")
     steps = math.ceil(min(config.samples_per_epoch, training.samples) / config.batch)
-    about: dict[str, Any] = {
-        "config": config.model_dump(mode="json"), "versions": all_versions(), "git": git_revision(),
-        "init": None if init is None else hashlib.sha256(init.read_bytes()).hexdigest(),
-        "data": content_key(read_manifest(data), config.sets),
-    }  # fmt: skip
     for epoch in range(len(history), config.epochs):
+        if _without_progress(history) >= config.patience:
+            break
         begun = time.perf_counter()
         row = _epoch(model, optimizer, config, training, epoch, steps, device, report)
+        if report is not None:
+            report(epoch, steps, steps, "validates")
         scores = evaluate(model, validation, config, device)
+        if not math.isfinite(scores.loss):
+            raise not_finite(scores.loss, f"the validation after epoch {epoch + 1}")
         row |= {"validation_loss": scores.loss, "validation_accuracy": scores.accuracy}
         row |= {"validation_regret_m": scores.regret_m, "wall_s": time.perf_counter() - begun}
         history.append(row)
@@ -114,10 +119,20 @@ def train(
         board.add(epoch, row)
         if report is not None:
             report(epoch, steps, steps, f"validation {scores.loss:.4f}, {100 * scores.accuracy:.2f} %")
-        if epoch - int(np.argmin([r["validation_loss"] for r in history])) >= config.patience:
-            break
     board.close()
     return history
+
+
+def _without_progress(history: list[dict[str, float]]) -> int:
+    """Return how many epochs have passed since the one with the least validation loss."""
+    return len(history) - 1 - int(np.argmin([row["validation_loss"] for row in history])) if history else 0
+
+
+def not_finite(loss: float, where: str) -> SwarmscopeError:
+    """Return the error of a training that has run away."""
+    return SwarmscopeError(
+        f"the loss is {loss} in {where}: lower learning_rate; the checkpoint of the epoch before is kept"
+    )
 
 
 def set_up(threads: int, seed: int) -> None:
@@ -143,27 +158,30 @@ def read_splits(config: TrainingConfig, data: Path) -> tuple[Shard, Shard]:
     whole = concatenate(list(load(data, list(config.sets)).values()))
     splits = split_of(whole.map)
     training, validation = (select(whole, splits == SPLITS.index(s)) for s in ("train", "validation"))
-    if not training.samples or not validation.samples:
+    if training.samples < 2 or not validation.samples:
         raise ConfigError(str(data), "has no samples for training or for validation; generate more")
     return training, some(validation, config.validation_samples, config.seed)
 
 
 def _resume(
-    config: TrainingConfig, out: Path, model: Chooser, optimizer: torch.optim.Optimizer
+    about: dict[str, Any], out: Path, model: Chooser, optimizer: torch.optim.Optimizer
 ) -> list[dict[str, float]]:
-    """Load the last checkpoint in ``out`` if there is one; return the history so far."""
+    """Load the last checkpoint in ``out`` if there is one, of the training ``about``; return the history so far."""
     path = out / LAST
     if not path.exists():
         return []
     found = checkpoints.read(path)
     checkpoints.expect(found, model.architecture, path)
     longer = {"epochs", "patience", "threads"}
-    before, now = found.about["config"], config.model_dump(mode="json")
+    before, now = found.about["config"], about["config"]
     for key in now:
         if key not in longer and before.get(key) != now[key]:
             raise ConfigError(str(out), f"holds a training with {key}: {before.get(key)}, not {now[key]}")
+    for key, what in (("data", "on other data"), ("init", "that began with another --init, or with none")):
+        if found.about.get(key) != about[key]:
+            raise ConfigError(str(out), f"holds a training {what}; name another --out")
     checkpoints.fill(model, "model.", found, path)
-    checkpoints.restore_optimizer(optimizer, found)
+    checkpoints.restore_optimizer(optimizer, found, path)
     return list(found.about["history"])
 
 
@@ -197,10 +215,7 @@ def _epoch(
         weights = torch.from_numpy(np.clip(batch.detour_m, *WEIGHTS) ** config.detour_power).to(device)
         loss = (functional.cross_entropy(logits, classes, reduction="none") * weights).sum() / weights.sum()
         if not bool(torch.isfinite(loss)):
-            raise SwarmscopeError(
-                f"the loss is {loss.item()} in epoch {epoch + 1}, batch {step + 1}: lower learning_rate; "
-                "the checkpoint of the epoch before is kept"
-            )
+            raise not_finite(loss.item(), f"epoch {epoch + 1}, batch {step + 1}")
         optimizer.zero_grad(set_to_none=True)
         loss.backward()  # type: ignore[no-untyped-call]
         torch.nn.utils.clip_grad_norm_(model.parameters(), LARGEST_GRADIENT)
@@ -249,7 +264,8 @@ def autocast(config: TrainingConfig, device: torch.device) -> Any:
 def _computes_bfloat16(device: torch.device) -> bool:
     if device.type == "cuda":
         return bool(torch.cuda.is_bf16_supported())
-    return bool(cast("Any", torch.cpu)._is_avx512_bf16_supported())
+    tells = getattr(torch.cpu, "_is_avx512_bf16_supported", None)  # no part of PyTorch's promises
+    return bool(tells is not None and tells())
 
 
 @torch.no_grad()
@@ -270,20 +286,31 @@ def evaluate(model: Chooser, data: Shard, config: TrainingConfig, device: torch.
 
 
 class _Board:
-    """Writes what TensorBoard reads."""
+    """Writes what TensorBoard reads; a disk that is full ends the training, but not without its checkpoints."""
 
     def __init__(self, folder: Path) -> None:
         from torch.utils.tensorboard import SummaryWriter
 
-        self._writer = SummaryWriter(str(folder))
+        self._folder = folder
+        with self._named():
+            self._writer = SummaryWriter(str(folder))
 
     def add(self, epoch: int, row: dict[str, float]) -> None:
         """Add the figures of an epoch."""
-        for name, value in row.items():
-            if name != "epoch":
-                self._writer.add_scalar(name, value, epoch + 1)
-        self._writer.flush()
+        with self._named():
+            for name, value in row.items():
+                if name != "epoch":
+                    self._writer.add_scalar(name, value, epoch + 1)
+            self._writer.flush()
 
     def close(self) -> None:
         """Close the file."""
-        self._writer.close()
+        with self._named():
+            self._writer.close()
+
+    @contextmanager
+    def _named(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            raise InputFileError(self._folder, f"cannot be written ({error.strerror})") from None

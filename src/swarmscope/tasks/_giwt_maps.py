@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from swarmscope.errors import UnsolvableWorldError
+from swarmscope.errors import ConfigError, UnsolvableWorldError
 from swarmscope.sim.world import Circle, Obstacle, Polygon, WorldSpec
 from swarmscope.tasks._rooms import WALL_M, closed_room
 
@@ -90,6 +90,12 @@ def stays_off(obstacle: Obstacle, points: Floats, distance: float) -> bool:
     off = rel - along[:, :, None] * edges
     inside = (edges[:, 0] * rel[:, :, 1] - edges[:, 1] * rel[:, :, 0] > 0.0).all(axis=1)
     return bool(not inside.any() and np.hypot(off[:, :, 0], off[:, :, 1]).min() > distance)
+
+
+def check_counts(fewest: float, most: float, task: str) -> None:
+    """Raise a ConfigError unless there is a whole number of obstacles from ``fewest`` to ``most``."""
+    if int(most) < int(fewest):
+        raise ConfigError(f"task {task}: most", f"is {most:g}, less than fewest, {fewest:g}")
 
 
 def unsolvable(name: str, seed: int, draws: int, why: str) -> UnsolvableWorldError:

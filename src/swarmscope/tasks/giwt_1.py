@@ -16,7 +16,7 @@ from swarmscope.sim.world import WorldSpec, compile_world
 from swarmscope.tasks._check import CLEARANCE_M, RESOLUTION_M
 from swarmscope.tasks._contract import Option, Setup, check_robots, read_options
 from swarmscope.tasks._forest import yaw_toward
-from swarmscope.tasks._giwt_maps import MapOptions, draw_map, unsolvable
+from swarmscope.tasks._giwt_maps import MapOptions, check_counts, draw_map, unsolvable
 from swarmscope.tasks._occupancy import centres_of, components, labels_at, rasterise
 
 NAME = "GIWT_1"
@@ -43,6 +43,7 @@ def make(seed: int, robots: int = 15, radius: float = 0.15, **options: Option) -
     """Return a solvable map with robots in its free space; options are the fields of `Options`."""
     check_robots(robots, radius)
     chosen = grown(read_options(Options, options, NAME), robots)
+    check_counts(chosen.fewest, chosen.most, NAME)
     for draw in range(DRAWS):
         rng = np.random.default_rng([seed, draw])
         world = draw_map(rng, chosen, np.zeros((0, 2)), 0.0)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from swarmscope.tasks._check import Reach, unreachable
 from swarmscope.tasks._contract import Option, Setup, check_robots, read_options
-from swarmscope.tasks._giwt_maps import MapOptions, draw_map, unsolvable
+from swarmscope.tasks._giwt_maps import MapOptions, check_counts, draw_map, unsolvable
 
 NAME = "GIWT_2"
 SUMMARY = "GIWT's task II: a column of robots crosses a random map from left to right, all in the same order"
@@ -23,6 +23,7 @@ def make(seed: int, robots: int = 15, radius: float = 0.15, **options: Option) -
     """Return a solvable map and two columns; options are the fields of `MapOptions`."""
     check_robots(robots, radius)
     chosen = read_options(MapOptions, options, NAME)
+    check_counts(chosen.fewest, chosen.most, NAME)
     starts, goals = columns(robots, radius, chosen.size_m)
     for draw in range(DRAWS):
         rng = np.random.default_rng([seed, draw])

@@ -17,7 +17,7 @@ from swarmscope.sim.world import Obstacle, WorldSpec
 from swarmscope.tasks._check import Reach, unreachable
 from swarmscope.tasks._contract import Option, Setup, check_robots, read_options
 from swarmscope.tasks._forest import smallest_spacing
-from swarmscope.tasks._giwt_maps import REDRAWS, Kind, draw_obstacle, stays_off, unsolvable
+from swarmscope.tasks._giwt_maps import REDRAWS, Kind, check_counts, draw_obstacle, stays_off, unsolvable
 from swarmscope.tasks._rooms import WALL_M, closed_room
 
 NAME = "GIWT_lab"
@@ -47,6 +47,7 @@ def make(seed: int, robots: int = 5, radius: float = 0.15, **options: Option) ->
     """Return a solvable floor; draw d of a seed uses the random stream (seed, d)."""
     check_robots(robots, radius)
     chosen = read_options(LabOptions, options, NAME)
+    check_counts(chosen.fewest, chosen.most, NAME)
     width, length = max(chosen.width_m, robots * smallest_spacing(radius)), chosen.length_m
     x, aside = (np.arange(robots) + 0.5) * width / robots, EDGE_M + radius
     starts = np.column_stack([x, np.full(robots, aside), np.full(robots, 0.5 * math.pi)])

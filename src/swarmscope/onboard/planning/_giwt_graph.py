@@ -20,7 +20,7 @@ GRID_M = 5.0
 OWN_CELL = 24
 """The middle cell, the robot itself."""
 VIEW_M = 2.5
-"""R_FOV, the radius of the pictures [m]."""
+"""R_FOV as printed [m]: the radius of the pictures of a model whose card names no other."""
 STEPS_PER_OCTAVE = 8.0
 SCALE_ZERO = 160
 """Scale codes: a scale is 2 ** ((code - SCALE_ZERO) / STEPS_PER_OCTAVE)."""

@@ -1,0 +1,80 @@
+"""``swarmscope giwt`` from data to a model that drives, in small; what is wrong is said in a line or two."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from command_line import SMALL, refused, swarmscope
+
+for package in ("torch", "torch_geometric", "safetensors", "tensorboard", "sklearn", "onnx", "onnxruntime"):
+    pytest.importorskip(package)
+
+SET = ("--set-of", "A-II-driven")
+TINY = ("tiny", "--set", "sets=[A-II-driven]", "--set", "epochs=1", "--set", "samples_per_epoch=200")
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("giwt")
+    made = swarmscope("giwt", "data", "--data", folder / "data", *SET, "--samples", 1500, "--workers", 1)
+    assert made.exit_code == 0 and "A-II-driven" in made.stdout
+    for network in ("giwt", "cnn"):
+        done = swarmscope("giwt", "train", *TINY, "--set", f"network={network}", "--data", folder / "data",
+                          "--out", folder / network)  # fmt: skip
+        assert done.exit_code == 0 and "best of 1 epochs" in done.stdout
+    return folder
+
+
+def evaluated(place, *words):
+    return ("giwt", "eval", *words, "--data", place / "data", *SET)
+
+
+@pytest.mark.slow
+def test_scores_pictures_export_and_a_run(place, tmp_path):
+    out, pictures = tmp_path / "scores.json", tmp_path / "pictures"
+    done = swarmscope(*evaluated(place, place / "giwt", place / "cnn"), "--radius", 4, "--radius", 2, "--radius", 4,
+                      "--out", out, "--pictures", pictures)  # fmt: skip
+    assert done.exit_code == 0, done.stderr
+    for words in ("accuracy on test maps", "giwt minus the others", "saved", "by perception radius"):
+        assert words in " ".join(done.stdout.split())
+    scores = json.loads(out.read_text())
+    assert [row["label"] for row in scores["sets"]["A-II-driven"]["networks"]] == ["giwt", "cnn"]
+    assert list(scores["radii"]["cnn"]) == ["2", "4"] and str(place) not in out.read_text()
+    assert {p.name for p in pictures.iterdir()} == {"layers.png", "radius.png"}
+    model = tmp_path / "model"
+    assert swarmscope("giwt", "export", place / "giwt", model, "--scores", out).exit_code == 0
+    assert json.loads((model / "model.json").read_text())["scores"] == scores
+    ran = swarmscope("run", *SMALL, "--planner", "giwt", "--set", f"planner.model={model}", "--out", tmp_path / "run")
+    assert ran.exit_code == 0, ran.stderr
+    assert swarmscope("giwt", "ceiling", "--data", place / "data", *SET).exit_code == 0
+    assert "checksums" in swarmscope("giwt", "data", "--data", place / "data", "--check").stdout
+
+
+def test_networks_with_one_name_are_told_apart(place, tmp_path):
+    out = tmp_path / "scores.json"
+    runs = (place / "cnn", place / "cnn" / "best.safetensors", place / "giwt")
+    assert swarmscope(*evaluated(place, *runs), "--out", out).exit_code == 0
+    assert list(json.loads(out.read_text())["mean_accuracy"]) == ["cnn (cnn) 1", "cnn (cnn) 2", "giwt"]
+
+
+def test_what_is_wrong_is_said_before_anything_is_scored(place, tmp_path):
+    run = place / "giwt"
+    assert "none of train, validation, test" in refused(*evaluated(place, run), "--split", "all")
+    assert "the pictures of giwt show 5 m" in refused(*evaluated(place, run), "--radius", 6)
+    assert "is a folder" in refused(*evaluated(place, run), "--out", tmp_path)
+    assert "no set 'C-I'" in refused("giwt", "eval", run, "--data", place / "data", "--set-of", "C-I")
+    assert "is not there" in refused(*evaluated(place, tmp_path))
+    assert "cannot be read" in refused("giwt", "export", run, tmp_path / "m", "--scores", tmp_path / "none.json")
+    assert "is no folder" in refused("giwt", "data", "--data", run / "best.safetensors")
+    assert "not KEY=VALUE" in refused("giwt", "train", "--set", "epochs")
+    assert "unknown key" in refused("giwt", "train", "--set", "speed=3")
+
+
+def test_ctrl_c_says_how_to_go_on(place, monkeypatch):
+    def stop(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("swarmscope.learning.train.train", stop)
+    stopped = swarmscope("giwt", "train", *TINY, "--data", place / "data")
+    assert stopped.exit_code == 130 and "goes on after the last whole epoch" in stopped.stderr
