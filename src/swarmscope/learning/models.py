@@ -97,8 +97,6 @@ class Giwt(nn.Module):
         self.own = None if as_printed else nn.Linear(FEATURES, FEATURES, bias=False)
         self.bend = nn.Identity() if as_printed else nn.LeakyReLU(SLOPE)
         self.embed = nn.Embedding(GRID * GRID, FEATURES) if use_position else None
-        if self.embed is not None:
-            nn.init.normal_(self.embed.weight, std=0.1)
         self.transform = nn.Linear(FEATURES, FEATURES, bias=False)
         self.query = nn.Linear(FEATURES, FEATURES, bias=False)
         self.key = nn.Linear(FEATURES, FEATURES, bias=False)
