@@ -55,7 +55,10 @@ def test_networks_with_one_name_are_told_apart(place, tmp_path):
     out = tmp_path / "scores.json"
     runs = (place / "cnn", place / "cnn" / "best.safetensors", place / "giwt")
     assert swarmscope(*evaluated(place, *runs), "--out", out).exit_code == 0
-    assert list(json.loads(out.read_text())["mean_accuracy"]) == ["cnn (cnn) 1", "cnn (cnn) 2", "giwt"]
+    scores = json.loads(out.read_text())
+    assert [row["label"] for row in scores["sets"]["A-II-driven"]["networks"]] == ["cnn (cnn) 1", "cnn (cnn) 2", "giwt"]
+    assert [row["first_ahead"]["value"] for row in scores["mean"][:2]] == [0.0, 0.0]
+    assert scores["mean"][2]["accuracy"] == scores["sets"]["A-II-driven"]["networks"][2]["accuracy"]
 
 
 def test_what_is_wrong_is_said_before_anything_is_scored(place, tmp_path):

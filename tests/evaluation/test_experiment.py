@@ -87,6 +87,9 @@ def test_gap_and_flow_time_name_planners():
     asked = small(gap={"worst": "alone", "best": "Nav-SCOPE"}, flow_time="alone")
     assert asked.gap.worst == "alone" and asked.flow_time == "alone"
     assert "gap: unknown planner 'Nav'" in wrong(gap={"worst": "alone", "best": "Nav"})
+    target = {"planner": "alone", "place": "ring", "metric": "gap_closed", "at_least": 0.5}
+    assert "unknown metric 'gap_closed'" in wrong(targets=[target])
+    assert small(gap={"worst": "alone", "best": "Nav-SCOPE"}, targets=[target]).targets[0].metric == "gap_closed"
     assert "same planner" in wrong(gap={"worst": "alone", "best": "alone"})
     assert "did you mean 'worst'" in wrong(gap={"worst": "alone", "best": "Nav-SCOPE", "wors": "alone"})
     assert "flow_time: unknown planner 'alon'; did you mean 'alone'" in wrong(flow_time="alon")

@@ -71,10 +71,26 @@ def test_the_gap_is_taken_over_robots_that_arrived_with_all():
     assert math.isnan(nothing.reduction.estimate) and nothing.reduction.used == nothing.robots == 0
 
 
-def test_flow_time_increases_are_of_robots_with_a_way_that_arrived():
-    runs = [
+def test_flow_time_increases_are_of_robots_with_a_way_that_arrived_in_both_runs():
+    ours = [
         run(travelled=(12.0, 15.0), shortest=(10.0, 10.0)),
-        run(travelled=(0.0, 50.0), shortest=(0.0, 10.0), arrival=(0.0, math.nan)),
+        run(seed=1, travelled=(0.0, 50.0), shortest=(0.0, 10.0), arrival=(0.0, math.nan)),
+        run(seed=2),
     ]
-    assert flow_time_increases(runs) == pytest.approx([0.2, 0.5])
-    assert len(flow_time_increases([])) == 0
+    others = [
+        run("left", travelled=(11.0, 13.0), shortest=(10.0, 10.0), arrival=(22.0, math.nan)),
+        run("left", seed=1, travelled=(0.0, 30.0), shortest=(0.0, 10.0), arrival=(0.0, 60.0)),
+    ]
+    mine, theirs = flow_time_increases(ours, others)
+    assert mine == pytest.approx([0.2]) and theirs == pytest.approx([0.1])
+    assert [len(values) for values in flow_time_increases([], others)] == [0, 0]
+
+
+def test_mean_ways_are_compared_over_robots_that_arrived_with_both():
+    ours = [run(travelled=(10.0, 99.0), mover_path_m=54.5), run(seed=1, arrival=(math.nan, 9.0), mover_path_m=12.0)]
+    others = [
+        run("left", travelled=(14.0, 50.0), arrival=(30.0, math.nan), mover_path_m=14.0),
+        run("left", seed=1, arrival=(9.0, math.nan), mover_path_m=10.0),
+    ]
+    found = paired(ours, others, "mover_path_m")
+    assert found.used == 1 and found.estimate == pytest.approx(-4.0)

@@ -17,7 +17,7 @@ from report_data import SMALL, all_played, experiment, hand_made, played
 from swarmscope.errors import SwarmscopeError
 from swarmscope.evaluation.experiment import load_experiment, shipped_experiment, units
 from swarmscope.evaluation.results import pooled_figures
-from swarmscope.evaluation.statistics import Interval, PairedDifference
+from swarmscope.evaluation.statistics import Interval, PairedDifference, wilson
 from swarmscope.evaluation.weight import WeightResult
 from swarmscope.viewing.report import figures, markdown, publish, tables, words, write_report
 from swarmscope.viewing.report.again import Again
@@ -192,6 +192,16 @@ def test_the_gap_table_says_what_share_is_closed_beside_the_published_one():
     assert tables.gap_table(Material(experiment(), RUNS)) is None
 
 
+def test_a_gap_can_be_a_target():
+    names = ("path_reduction", "gap_closed")
+    targets = [{"planner": "Ours", "place": "P", "metric": name, "at_least": 0.5} for name in names]
+    material = Material(experiment(**(GAP | {"targets": targets})), GAP_RUNS)
+    found = material.gap("P", "Ours")
+    assert material.figure("P", "Ours", "gap_closed") == found.closed
+    shown = rows_of(tables.target_table(material))
+    assert list(shown) == ["Ways shorter by", "Gap closed"]
+
+
 def test_flow_times_are_drawn_and_their_means_said(tmp_path: Path):
     material = Material(experiment(**GAP), GAP_RUNS)
     with style():
@@ -209,7 +219,11 @@ def test_shares_of_movers_and_of_judged_choices_are_pooled():
     judged = [{"side_accuracy": 1.0, "sides_judged": 2.0}, {"side_accuracy": 0.5, "sides_judged": 6.0}]
     runs = [hand_made("P", "Ours", k, [10.0], **(counted[k] | judged[k])) for k in range(2)]
     arrived = figure_of(runs, "mover_arrival_rate")
-    assert arrived.estimate == pytest.approx(39 / 40) and arrived.used == 40 and arrived.high < 1.0
+    assert arrived == (pytest.approx(39 / 40), pytest.approx(0.9), 1.0, 40)  # robots of a map stand or fall together
+    everybody = [hand_made("P", "Ours", k, [10.0], movers=10.0, mover_arrival_rate=1.0) for k in range(2)]
+    assert figure_of(everybody, "mover_arrival_rate") == wilson(2, 2)._replace(used=20)
+    single = [hand_made("P", "Ours", k, [10.0], movers=1.0, mover_arrival_rate=float(k > 0)) for k in range(4)]
+    assert figure_of(single, "mover_arrival_rate") == wilson(3, 4)
     assert figure_of(runs, "side_accuracy")[:1] == (pytest.approx(5 / 8),)
     nobody = [hand_made("P", "Ours", 0, [10.0], side_accuracy=None, sides_judged=0.0)]
     assert math.isnan(figure_of(nobody, "side_accuracy").estimate)

@@ -9,7 +9,6 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import yaml
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
@@ -19,8 +18,8 @@ from swarmscope.cli._console import PlainConsole
 from swarmscope.errors import ConfigError, MissingExtraError
 from swarmscope.learning.generate import DRIVEN, PLACED, generate, totals, verify
 
-RADII_SAMPLES = 12_000
-"""Samples on which networks are scored for every radius."""
+RADII_SAMPLES = 4_000
+"""Samples of each set on which networks are scored for every radius."""
 
 
 def data_command(folder: Path, sets: Sequence[str], samples: int, workers: int | None, check: bool) -> None:
@@ -95,7 +94,7 @@ def eval_command(
 ) -> None:
     """Score trained networks on every set and compare the first with the others."""
     _need("torch", "torch_geometric", "safetensors", *([] if pictures is None else ["sklearn"]))
-    from swarmscope.learning.evaluate import data_key, open_trained, read_test, share
+    from swarmscope.learning.evaluate import data_key, open_trained, read_test
     from swarmscope.learning.records import SPLITS
 
     if split not in SPLITS:
@@ -109,10 +108,7 @@ def eval_command(
         shards = read_test(data, expand(sets), split)
     result: dict[str, Any] = {"data": data_key(data, list(shards)), "split": split, "sets": {}}
     everything = _score_sets(networks, shards, result, out)
-    means = [_mean(result, k) for k in range(len(networks))]
-    joined = [[np.concatenate([getattr(v, part) for v in kept]) for part in ("hit", "map")] for kept in everything]
-    result["whole"] = [share(hit, maps)._asdict() for hit, maps in joined]
-    result["mean_accuracy"] = {one.label: value for one, value in zip(networks, means, strict=True)}
+    result["mean"] = [_means(kept, everything[0]) for kept in everything]
     console, labels = PlainConsole(width=None if sys.stdout.isatty() else 170), [one.label for one in networks]
     for table in (_accuracy_table, _difference_table, _regret_table):
         console.print(table(result, labels))
@@ -171,21 +167,22 @@ def _checked_radii(radii: Sequence[float], networks: Sequence[Any]) -> list[floa
 
 def _at_radii(networks: Sequence[Any], shards: dict[str, Any], radii: Sequence[float], console: Console) -> Any:
     """Score networks with robots that see less far, on some samples of all sets; print a table."""
-    from swarmscope.learning.evaluate import judge, share
-    from swarmscope.learning.records import concatenate, some
+    from swarmscope.learning.evaluate import judge, mean_share
+    from swarmscope.learning.records import some
 
-    whole = some(concatenate(list(shards.values())), RADII_SAMPLES)
-    table = Table(title=f"accuracy on {whole.samples} samples of all sets by perception radius, % (95 %)")
+    few = [some(shard, RADII_SAMPLES) for shard in shards.values()]
+    total = sum(shard.samples for shard in few)
+    table = Table(title=f"accuracy by perception radius, mean over the sets, {total} samples, % (95 %)")
     table.add_column("radius", justify="right")
     for one in networks:
         table.add_column(one.label, justify="right")
     scores: dict[str, dict[float, Any]] = {one.label: {} for one in networks}
     with _bar() as bar:
-        job = bar.add_task("radii", total=len(networks) * len(radii) * whole.samples, note="")
+        job = bar.add_task("radii", total=len(networks) * len(radii) * total, note="")
         for radius in radii:
             for one in networks:
-                verdict = judge(one, whole, lambda done: bar.advance(job, done), radius)
-                scores[one.label][radius] = share(verdict.hit, verdict.map)
+                verdicts = [judge(one, shard, lambda done: bar.advance(job, done), radius) for shard in few]
+                scores[one.label][radius] = mean_share([(v.hit, v.map) for v in verdicts])
             table.add_row(f"{radius:g} m", *(_words(scores[one.label][radius]._asdict()) for one in networks))
     console.print(table)
     return scores
@@ -280,9 +277,16 @@ def _words(score: Any) -> str:
     return f"{100 * score['value']:.2f} ({100 * score['low']:.1f}-{100 * score['high']:.1f})"
 
 
-def _mean(result: dict[str, Any], k: int) -> float:
-    values = [entry["networks"][k]["accuracy"]["value"] for entry in result["sets"].values()]
-    return float(sum(values) / len(values))
+def _means(verdicts: Sequence[Any], first: Sequence[Any]) -> dict[str, Any]:
+    """Return means over the sets: accuracy, how far the ``first`` network is ahead, what bytes cost."""
+    from swarmscope.learning.evaluate import mean_share
+
+    values = {
+        "accuracy": [(v.hit, v.map) for v in verdicts],
+        "first_ahead": [(a.hit.astype(float) - v.hit, v.map) for a, v in zip(first, verdicts, strict=True)],
+        "lost_on_the_radio": [(v.hit.astype(float) - v.hit_as_sent, v.map) for v in verdicts],
+    }
+    return {name: mean_share(parts)._asdict() for name, parts in values.items()}
 
 
 def _accuracy_table(result: dict[str, Any], labels: list[str]) -> Table:
@@ -292,7 +296,7 @@ def _accuracy_table(result: dict[str, Any], labels: list[str]) -> Table:
     for name, entry in result["sets"].items():
         words = (_words(row["accuracy"]) for row in entry["networks"])
         table.add_row(name, str(entry["samples"]), f"{100 * entry['majority']:.1f}", *words)
-    table.add_row("mean", "", "", *(f"{100 * result['mean_accuracy'][label]:.2f}" for label in labels))
+    table.add_row("mean", "", "", *(_words(row["accuracy"]) for row in result["mean"]))
     return table
 
 
@@ -300,8 +304,8 @@ def _difference_table(result: dict[str, Any], labels: list[str]) -> Table:
     table = Table(title=f"{labels[0]} minus the others, and its features exact minus in bytes: percentage points")
     for column in ("set", *labels[1:], "bytes"):
         table.add_column(column, justify="right")
-    for name, entry in result["sets"].items():
-        rows = entry["networks"]
+    every = {name: entry["networks"] for name, entry in result["sets"].items()}
+    for name, rows in (every | {"mean": result["mean"]}).items():
         apart = [*(row["first_ahead"] for row in rows[1:]), rows[0]["lost_on_the_radio"]]
         words = (tuple(100 * score[key] for key in ("value", "low", "high")) for score in apart)
         table.add_row(name, *(f"{value:+.2f} ({low:+.2f}..{high:+.2f})" for value, low, high in words))

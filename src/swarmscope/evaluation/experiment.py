@@ -15,7 +15,7 @@ import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from swarmscope.errors import ConfigError, InputFileError, UnknownNameError, nearest_hint
-from swarmscope.evaluation.metrics import COUNTED, METRICS
+from swarmscope.evaluation.metrics import BETWEEN, COUNTED, METRICS
 from swarmscope.evaluation.scenario import Scenario, parse_scenario
 from swarmscope.evaluation.seeds import seed_set
 
@@ -134,9 +134,12 @@ class Experiment(_Strict):
                 raise ValueError("gap: 'worst' and 'best' are the same planner")
         if self.flow_time is not None:
             _known("planner", self.flow_time, self.planners, "flow_time")
-        named = [*self.metrics, *(p.metric for p in self.published), *(t.metric for t in self.targets)]
-        for metric in named:
-            _known("metric", metric, [m.name for m in (*METRICS, *COUNTED)], "metrics")
+        known = [m.name for m in (*METRICS, *COUNTED)]
+        for metric in (*self.metrics, *(p.metric for p in self.published)):
+            _known("metric", metric, known, "metrics")
+        for target in self.targets:
+            more = [] if self.gap is None else [m.name for m in BETWEEN]
+            _known("metric", target.metric, [*known, *more], "targets")
         return self
 
 

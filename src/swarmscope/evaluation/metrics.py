@@ -66,9 +66,16 @@ COUNTED: list[Metric] = [
 """What a run counts by itself; found in ``metrics.json`` beside `METRICS`."""
 
 
+BETWEEN: list[Metric] = [
+    Metric("path_reduction", "", "higher", "how much shorter ways are than with the gap's worst planner"),
+    Metric("gap_closed", "", "higher", "share of the gap between the worst and the best planner's ways that is closed"),
+]
+"""Figures of a planner beside the two that an experiment names as its gap."""
+
+
 def metric_named(name: str) -> Metric:
     """Return how the figure ``name`` is to be read; raises KeyError."""
-    return {metric.name: metric for metric in (*METRICS, *COUNTED)}[name]
+    return {metric.name: metric for metric in (*METRICS, *COUNTED, *BETWEEN)}[name]
 
 
 def path_lengths(x_m: Floats, y_m: Floats, t_s: Floats, arrival_s: Floats) -> Floats:

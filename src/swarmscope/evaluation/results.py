@@ -14,6 +14,9 @@ from swarmscope.evaluation.statistics import Interval, PairedDifference, bootstr
 
 Floats = NDArray[np.float64]
 
+PATH_LENGTHS = ("average_path_length_m", "mover_path_m")
+"""Means over robots that arrived; compared over those that arrived with both planners."""
+
 
 @dataclass(frozen=True)
 class Run:
@@ -69,11 +72,27 @@ def grouped(runs: Iterable[Run]) -> dict[tuple[str, str], list[Run]]:
 
 
 def paired(ours: list[Run], others: list[Run], metric: str) -> PairedDifference:
-    """Return the mean difference ours - other of one figure over the maps (seeds) that both have it on."""
+    """Return the mean difference ours - other of one figure over the maps (seeds) that both have it on.
+
+    Mean path lengths are of the robots that arrived with both.
+    """
     mine = {run.seed: run.figures.get(metric) for run in ours}
     theirs = {run.seed: run.figures.get(metric) for run in others}
+    if metric in PATH_LENGTHS:
+        other = {run.seed: run for run in others}
+        pairs = {run.seed: common_paths(run, other[run.seed]) for run in ours if run.seed in other}
+        mine = {seed: pair[0] for seed, pair in pairs.items()}
+        theirs = {seed: pair[1] for seed, pair in pairs.items()}
     seeds = [s for s in sorted(mine.keys() & theirs.keys()) if mine[s] is not None and theirs[s] is not None]
     return paired_difference([mine[s] for s in seeds], [theirs[s] for s in seeds])  # type: ignore[arg-type]
+
+
+def common_paths(run: Run, other: Run) -> tuple[float | None, float | None]:
+    """Return the mean ways [m] of the robots that arrived in both runs and had to move; None without any."""
+    both = np.isfinite(run.arrival_s) & np.isfinite(other.arrival_s) & (other.travelled_m > 0.0)
+    if not both.any():
+        return None, None
+    return float(run.travelled_m[both].mean()), float(other.travelled_m[both].mean())
 
 
 class PathGap(NamedTuple):
@@ -108,15 +127,19 @@ def path_gap(runs: list[Run], worst: list[Run], best: list[Run]) -> PathGap:
     return PathGap(bootstrap_ratio(shorter, longest), bootstrap_ratio(gained, whole), robots)
 
 
-def flow_time_increases(runs: Iterable[Run]) -> Floats:
-    """Return FT = (l - l*) / l* of every robot that arrived and had a way to go (GIWT 5.3), l* by A*."""
-    every = list(runs)
-    travelled = np.concatenate([run.travelled_m for run in every] or [np.zeros(0)])
-    shortest = np.concatenate([run.shortest_m for run in every] or [np.zeros(0)])
-    arrival = np.concatenate([run.arrival_s for run in every] or [np.zeros(0)])
-    chosen = np.isfinite(arrival) & (shortest > 0.0)
-    increases: Floats = travelled[chosen] / shortest[chosen] - 1.0
-    return increases
+def flow_time_increases(runs: Iterable[Run], others: Iterable[Run]) -> tuple[Floats, Floats]:
+    """Return FT = (l - l*) / l* (GIWT 5.3) of every robot that arrived in both runs of a map and had a way to go.
+
+    ``l*`` is the way by A*.
+    """
+    of_seed = {run.seed: run for run in others}
+    mine, theirs = [np.zeros(0)], [np.zeros(0)]
+    for run in (run for run in runs if run.seed in of_seed):
+        other = of_seed[run.seed]
+        chosen = np.isfinite(run.arrival_s) & np.isfinite(other.arrival_s) & (run.shortest_m > 0.0)
+        mine.append(run.travelled_m[chosen] / run.shortest_m[chosen] - 1.0)
+        theirs.append(other.travelled_m[chosen] / run.shortest_m[chosen] - 1.0)
+    return np.concatenate(mine), np.concatenate(theirs)
 
 
 class TimeBudget(NamedTuple):

@@ -7,7 +7,7 @@ samples, is bootstrapped over maps.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -22,7 +22,7 @@ from swarmscope.learning.batches import Batch, batches
 from swarmscope.learning.config import TrainingConfig, parse_config
 from swarmscope.learning.models import Chooser
 from swarmscope.learning.records import SPLITS, Shard, content_key, load, read_manifest, select, split_of
-from swarmscope.learning.train import BEST, autocast, decide, encode, place, set_up, view_of
+from swarmscope.learning.train import BEST, decide, encode, place, set_up, view_of
 from swarmscope.onboard.planning._giwt_graph import quantise, restore
 
 RESAMPLES = 2000
@@ -46,8 +46,6 @@ class Verdict(NamedTuple):
     """(n,) whether the side is the expert's."""
     hit_as_sent: NDArray[np.bool_]
     """(n,) the same with neighbours' features as they come over the radio, in bytes."""
-    p_left: NDArray[np.float32]
-    """(n,)."""
     map: NDArray[np.int64]
     """(n,) seed of the map."""
     detour_m: NDArray[np.float32]
@@ -96,26 +94,29 @@ def data_key(data: Path, names: list[str]) -> str:
 def judge(
     trained: Trained, data: Shard, report: Callable[[int], None] | None = None, seen_m: float = math.inf
 ) -> Verdict:
-    """Return the network's answers on ``data``, of robots that see ``seen_m`` far."""
+    """Return the network's answers on ``data``, of robots that see ``seen_m`` far, in float32 as on the robot."""
     config, model = trained.config, trained.model.eval()
     view = view_of(config)
     view = view._replace(seen_m=min(seen_m, view.seen_m))
     set_up(config.threads, config.seed)
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
     place(model, device)
-    parts: list[tuple[NDArray[np.float32], NDArray[np.float32]]] = []
+    parts: list[tuple[NDArray[np.bool_], NDArray[np.bool_]]] = []
     for batch in batches(data, 2 * config.batch, view):
-        with autocast(config, device):
-            features = encode(model, batch, device)
-            logits = decide(model, features, batch, device)
-            sent = decide(model, as_sent(features, batch), batch, device)
-        exact, received = (torch.softmax(x.float(), dim=1)[:, 0].cpu().numpy() for x in (logits, sent))
-        parts.append((exact, received))
+        features = encode(model, batch, device)
+        logits = decide(model, features, batch, device)
+        sent = decide(model, as_sent(features, batch), batch, device)
+        parts.append((says_left(logits), says_left(sent)))
         if report is not None:
             report(len(batch.right))
-    p_left, p_sent = (np.concatenate(part) for part in zip(*parts, strict=True))
+    exact, received = (np.concatenate(part) for part in zip(*parts, strict=True))
     left = data.side > 0
-    return Verdict((p_left > 0.5) == left, (p_sent > 0.5) == left, p_left, data.map, data.detour_m)
+    return Verdict(exact == left, received == left, data.map, data.detour_m)
+
+
+def says_left(logits: torch.Tensor) -> NDArray[np.bool_]:
+    """Return (B,) whether the network's side is left; equal logits are."""
+    return np.asarray((logits[:, 0] >= logits[:, 1]).cpu().numpy())
 
 
 def as_sent(features: torch.Tensor, batch: Batch) -> torch.Tensor:
@@ -138,15 +139,30 @@ def through_bytes(features: np.ndarray, chosen: np.ndarray, codes: np.ndarray) -
 
 def share(values: NDArray[np.float64] | NDArray[np.bool_], maps: NDArray[np.int64]) -> Score:
     """Return the mean of ``values (n,)`` with its interval over maps."""
+    return mean_share([(values, maps)])
+
+
+def mean_share(parts: Sequence[tuple[NDArray[np.float64] | NDArray[np.bool_], NDArray[np.int64]]]) -> Score:
+    """Return the mean over sets, each counting alike, of the means of their values, with its interval over maps."""
+    means = np.mean([_resampled(values, maps, k) for k, (values, maps) in enumerate(parts)], axis=0)
+    low, high = np.quantile(means, [0.025, 0.975])
+    value = float(np.mean([np.mean(values) for values, _ in parts]))
+    maps_in_all = sum(len(np.unique(maps)) for _, maps in parts)
+    return Score(value, float(low), float(high), sum(len(values) for values, _ in parts), maps_in_all)
+
+
+def _resampled(
+    values: NDArray[np.float64] | NDArray[np.bool_], maps: NDArray[np.int64], seed: int
+) -> NDArray[np.float64]:
+    """Return the means (RESAMPLES,) of values whose maps are drawn with replacement."""
     _, index = np.unique(maps, return_inverse=True)
     total, count = np.bincount(index, values.astype(np.float64)), np.bincount(index)
-    rng = np.random.default_rng(0)
+    rng = np.random.default_rng(seed)
     means = np.empty(RESAMPLES)
     for k in range(RESAMPLES):
         drawn = np.bincount(rng.integers(0, len(count), len(count)), minlength=len(count))
         means[k] = (drawn * total).sum() / (drawn * count).sum()
-    low, high = np.quantile(means, [0.025, 0.975])
-    return Score(float(np.mean(values)), float(low), float(high), len(values), len(count))
+    return means
 
 
 def ahead_of(one: Verdict, other: Verdict) -> Score:

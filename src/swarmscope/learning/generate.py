@@ -138,7 +138,7 @@ def _fill(
         data, about = pending.pop(len(shards)).result()
         file = f"{one.text}/shard-{len(shards):05d}.npz"
         write_atomically(folder / file, data)
-        shards.append({"file": file, "sha256": hashlib.sha256(data).hexdigest(), **about})
+        shards.append({"file": file, "sha256": hashlib.sha256(data).hexdigest(), "git": git_revision(), **about})
         write_manifest(folder, manifest)
         total += about["samples"]
         if report is not None:

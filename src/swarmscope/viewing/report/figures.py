@@ -210,7 +210,8 @@ def flow_time_picture(material: Material) -> Picture | None:
     panels = figure.subplots(1, len(material.places), squeeze=False)[0]
     cases = []
     for axes, place in zip(panels, material.places, strict=True):
-        found = {name: 100.0 * flow_time_increases(material.of(place, name)) for name in (other, ours)}
+        both = flow_time_increases(material.of(place, other), material.of(place, ours))
+        found = {name: 100.0 * values for name, values in zip((other, ours), both, strict=True)}
         every = np.concatenate(list(found.values()))
         top = FLOW_STEP * math.ceil(max(100.0, float(np.percentile(every, 98)) if len(every) else 0.0) / FLOW_STEP)
         edges = np.arange(-FLOW_STEP, top + 0.5 * FLOW_STEP, FLOW_STEP)
@@ -230,8 +231,8 @@ def flow_time_picture(material: Material) -> Picture | None:
     handles, labels = next((h for axes in panels if (h := axes.get_legend_handles_labels())[0]), ([], []))
     figure.legend(handles, labels, loc="outside upper left", ncols=2)
     caption = (
-        f"Flow-time increase (l − l*) / l* of robots that arrived, {ours} and {other}; l*: the shortest way by A*. "
-        f"What is beyond the last bin is in it. Dashed: means, {', '.join(cases)}."
+        f"Flow-time increase (l − l*) / l* of robots that arrived with both {ours} and {other}; l*: the shortest way "
+        f"by A*. What is beyond the last bin is in it. Dashed: means, {', '.join(cases)}."
     )
     return picture(figure, "flow_time", caption, f"Flow-time increase of {ours} and {other}")
 

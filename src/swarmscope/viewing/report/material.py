@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarmscope.evaluation.experiment import Experiment, merged
+from swarmscope.evaluation.metrics import BETWEEN
 from swarmscope.evaluation.results import PathGap, Run, grouped, paired, path_gap, pooled_figures, values_of
 from swarmscope.evaluation.statistics import (
     RESAMPLES,
@@ -54,8 +55,15 @@ class Material:
         """Return the figure that tables show: pooled over robots where defined, else the mean over the maps."""
         key = (place, planner, metric)
         if key not in self._figures:
-            self._figures[key] = figure_of(self.of(place, planner), metric)
+            between = metric in [m.name for m in BETWEEN]
+            self._figures[key] = self._between(*key) if between else figure_of(self.of(place, planner), metric)
         return self._figures[key]
+
+    def _between(self, place: str, planner: str, metric: str) -> Interval:
+        gap = self.gap(place, planner)
+        if gap is None:
+            return Interval(math.nan, math.nan, math.nan, 0)
+        return gap.reduction if metric == "path_reduction" else gap.closed
 
     def per_map(self, place: str, planner: str, metric: str) -> Floats:
         """Return the figure of every single run that has it."""
@@ -124,13 +132,26 @@ def figure_of(runs: list[Run], metric: str) -> Interval:
     if metric == "mover_arrival_rate":
         movers, rates = values_of(runs, "movers"), values_of(runs, metric)
         there = np.isfinite(movers * rates)
-        return wilson(round(float((movers * rates)[there].sum())), int(movers[there].sum()))
+        return _arrival_share((movers * rates)[there], movers[there])
     if metric == "side_accuracy":
         judged = values_of(runs, "sides_judged")
         return bootstrap_ratio(values_of(runs, metric) * judged, judged)
     if metric in POOLED:
         return pooled_interval(runs, metric)
     return bootstrap_mean(values_of(runs, metric))
+
+
+def _arrival_share(arrived: Floats, movers: Floats) -> Interval:
+    """Return the share of robots that arrived; robots of one map share a fate, so the interval goes by map.
+
+    With one robot a map it is Wilson's, and so it is, with as many trials as maps, where nobody or everybody arrived.
+    """
+    robots, everybody = int(movers.sum()), int(arrived.sum()) == int(movers.sum())
+    if not (movers > 1).any():
+        return wilson(round(float(arrived.sum())), robots)
+    if arrived.any() and not everybody:
+        return bootstrap_ratio(arrived, movers)._replace(used=robots)
+    return wilson(len(movers) if everybody else 0, len(movers))._replace(used=robots)
 
 
 def pooled_interval(runs: list[Run], metric: str, seed: int = 0) -> Interval:

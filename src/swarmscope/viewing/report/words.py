@@ -31,6 +31,8 @@ TITLES = {
     "mover_path_m": "Path length APL",
     "mover_arrival_rate": "Success rate SR",
     "side_accuracy": "Accuracy of sides Acc",
+    "path_reduction": "Ways shorter by",
+    "gap_closed": "Gap closed",
     "sides_judged": "Choices judged",
     "planning_failures": "Planning failures N_a",
     "fusions": "Fusions N_u",
@@ -44,7 +46,7 @@ TITLES = {
 SHARES = frozenset(
     {
         "arrival_rate", "collision_rate", "path_redundancy", "path_redundancy_all", "spl", "mover_arrival_rate",
-        "side_accuracy",
+        "side_accuracy", "path_reduction", "gap_closed",
     }
 )  # fmt: skip
 RATIOS = frozenset({"path_stretch", "path_stretch_any_angle"})
