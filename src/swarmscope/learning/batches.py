@@ -64,7 +64,7 @@ def batches(data: Shard, size: int, view: View, rng: np.random.Generator | None 
     seen = np.full(data.samples, view.seen_m)
     if rng is not None and view.shorter > 0.0:
         short = rng.random(data.samples) < view.shorter
-        seen[short] = rng.uniform(SHORTEST_M, view.seen_m, int(short.sum()))
+        seen[short] = rng.uniform(min(SHORTEST_M, view.seen_m), view.seen_m, int(short.sum()))
     for k in range(0, data.samples, size):
         chosen = order[k : k + size]
         yield make_batch(data, chosen, mirrored[chosen], seen[chosen], view)
