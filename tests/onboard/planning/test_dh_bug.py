@@ -86,6 +86,16 @@ def test_a_robot_turns_to_its_goal_before_it_drives_there():
     assert robot.decision["v"] == 0.5
 
 
+def test_without_the_sector_a_gap_is_taken_that_the_body_fits_through():
+    gap = [(0.5, 1.25, 1.0), (0.5, -1.25, 1.0)]  # 0.5 m wide, the body and its margins need 0.38 m
+    robot = Robot(sector=0).face(gap).step()
+    assert robot.mode == MODE_B and robot.decisions["fused"][0] == 0
+    robot = Robot(sector=1).face(gap).step()
+    assert robot.mode != MODE_B
+    closed = Robot(sector=0).face([(0.5, 1.15, 1.0), (0.5, -1.15, 1.0)]).step()
+    assert closed.mode != MODE_B
+
+
 @pytest.mark.parametrize(("turn", "side", "turns", "follows"), [(0, 1, MODE_C, MODE_E), (1, -1, MODE_D, MODE_F)])
 def test_at_a_key_point_it_turns_and_then_follows(turn, side, turns, follows):
     robot = Robot(turn=turn).face(BIG).step()
