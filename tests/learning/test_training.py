@@ -141,6 +141,10 @@ def test_the_encoder_of_another_network_is_taken_over(data, tmp_path):
     train.train(config(learning_rate=1e-9, **short), data, tmp_path / "giwt", tmp_path / "cnn" / "last.safetensors")
     a, b = (checkpoints.read(tmp_path / n / "last.safetensors").tensors for n in ("cnn", "giwt"))
     assert torch.allclose(a["model.encoder.linear.weight"], b["model.encoder.linear.weight"], atol=1e-5)
+    again = config(network="cnn", learning_rate=1e-9, **short)
+    train.train(again, data, tmp_path / "on", tmp_path / "cnn" / "last.safetensors")
+    on = checkpoints.read(tmp_path / "on" / "last.safetensors").tensors
+    assert torch.allclose(a["model.mapper.1.weight"], on["model.mapper.1.weight"], atol=1e-5)
     with pytest.raises(ConfigError, match="another architecture"):
         train.train(config(channels=[4, 4, 4], **short), data, tmp_path / "no", tmp_path / "cnn" / "last.safetensors")
 

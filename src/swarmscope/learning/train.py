@@ -79,14 +79,14 @@ def train(
 ) -> list[dict[str, float]]:
     """Train, or go on training, in folder ``out``; return the history, a row for each epoch.
 
-    ``init`` is a checkpoint whose encoder is taken over. Raises ConfigError when ``out`` holds another training,
+    ``init`` is a checkpoint that is begun from: all of it if it is of the same architecture, else its encoder. Raises ConfigError when ``out`` holds another training,
     SwarmscopeError when the loss is not finite; the last checkpoint stays.
     """
     set_up(config.threads, config.seed)
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
     model = place(Chooser(architecture_of(config)), device)
     if init is not None:
-        checkpoints.fill(model.encoder, "model.encoder.", checkpoints.read(init), init)
+        _begin_from(init, model)
     optimizer = torch.optim.AdamW(model.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay)
     training, validation = read_splits(config, data)
     about: dict[str, Any] = {
@@ -126,6 +126,14 @@ def train(
 def _without_progress(history: list[dict[str, float]]) -> int:
     """Return how many epochs have passed since the one with the least validation loss."""
     return len(history) - 1 - int(np.argmin([row["validation_loss"] for row in history])) if history else 0
+
+
+def _begin_from(init: Path, model: Chooser) -> None:
+    found = checkpoints.read(init)
+    if found.architecture == model.architecture:
+        checkpoints.fill(model, "model.", found, init)
+    else:
+        checkpoints.fill(model.encoder, "model.encoder.", found, init)
 
 
 def not_finite(loss: float, where: str) -> SwarmscopeError:
