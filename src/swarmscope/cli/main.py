@@ -366,7 +366,9 @@ def giwt_train(
     config: Annotated[str, typer.Argument(help="tiny, cpu, full, or a YAML file.")] = "cpu",
     data: GiwtData = Path("runs/giwt/data"),
     out: Annotated[Path | None, typer.Option(help="Folder, else runs/giwt/<network>.")] = None,
-    init: Annotated[Path | None, typer.Option(help="Checkpoint to begin from; of one of another network the encoder is taken.")] = None,
+    init: Annotated[
+        Path | None, typer.Option(help="Checkpoint to begin from; of another network its encoder is taken over.")
+    ] = None,
     set_: Annotated[
         list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="A key of the configuration; repeatable.")
     ] = None,

@@ -79,8 +79,9 @@ def train(
 ) -> list[dict[str, float]]:
     """Train, or go on training, in folder ``out``; return the history, a row for each epoch.
 
-    ``init`` is a checkpoint that is begun from: all of it if it is of the same architecture, else its encoder. Raises ConfigError when ``out`` holds another training,
-    SwarmscopeError when the loss is not finite; the last checkpoint stays.
+    ``init`` is a checkpoint to begin from: all of it if it is of the same architecture, else its encoder. Raises
+    ConfigError when ``out`` holds another training, SwarmscopeError when the loss is not finite; the last checkpoint
+    stays.
     """
     set_up(config.threads, config.seed)
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
