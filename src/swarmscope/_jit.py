@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 import os
 import shutil
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -69,6 +70,10 @@ OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 LEAN = OPTIONS | {"_nrt": False, "no_cfunc_wrapper": True}
 """Without Numba's runtime (``_nrt=False``) arrays are not reference-counted, which costs more than the work in
 short kernels, and a kernel that allocates does not compile."""
+
+
+# giwt's memory begins with that of DH-Bug, so that DH-Bug's kernels can drive it.
+warnings.filterwarnings("ignore", "Record.*has been considered a subtype", numba.NumbaExperimentalFeatureWarning)
 
 
 def _compile(function: F, options: dict[str, Any]) -> F:

@@ -169,13 +169,13 @@ def test_an_export_that_answers_otherwise_or_has_no_place_leaves_everything_as_i
 def test_scores_of_another_network_do_not_get_into_a_card(tmp_path):
     path, scores = write_untrained(tmp_path / "model.safetensors", network="cnn"), tmp_path / "scores.json"
     row = {"label": "cnn", "sha256": checkpoints.sha256_of(path)}
-    complete = {"sets": {"A-I": {"networks": [row]}}, "mean_accuracy": {"cnn": 0.8}}
+    complete = {"sets": {"A-I": {"networks": [row]}}, "mean": [{}]}
     scores.write_text(json.dumps(complete))
     assert export.read_scores(scores, path) == complete
     row["sha256"] = "0" * 64
     wrong = {
         "no scores of": complete, "no complete scores": {"sets": complete["sets"]}, "complete scores": [1],
-        "another form": {"sets": {"A-I": 3}, "mean_accuracy": {}},
+        "another form": {"sets": {"A-I": 3}, "mean": []},
     }  # fmt: skip
     for words, values in wrong.items():
         scores.write_text(json.dumps(values))

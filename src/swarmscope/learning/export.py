@@ -111,7 +111,7 @@ def read_scores(path: Path, checkpoint: Path) -> dict[str, Any]:
         scores = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise InputFileError(path, f"cannot be read ({error})") from None
-    if not isinstance(scores, dict) or not isinstance(scores.get("sets"), dict) or "mean_accuracy" not in scores:
+    if not isinstance(scores, dict) or not isinstance(scores.get("sets"), dict) or "mean" not in scores:
         raise InputFileError(path, "holds no complete scores of 'swarmscope giwt eval'")
     try:
         known = {row.get("sha256") for entry in scores["sets"].values() for row in entry["networks"]}
