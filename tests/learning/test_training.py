@@ -18,13 +18,13 @@ from swarmscope.learning import checkpoints, export, models, train  # noqa: E402
 from swarmscope.learning.batches import View, make_batch  # noqa: E402
 from swarmscope.learning.config import parse_config, read_config  # noqa: E402
 from swarmscope.learning.evaluate import (  # noqa: E402
-    ahead_of,
     as_sent,
     coin_regret,
     judge,
     majority,
     open_trained,
     read_test,
+    scores_of,
     share,
 )
 from swarmscope.learning.generate import generate  # noqa: E402
@@ -60,7 +60,7 @@ def test_a_tiny_network_learns_more_than_the_majority(data, tmp_path):
     verdict = judge(open_trained(tmp_path / "run"), test)
     score = share(verdict.hit, verdict.map)
     assert most + 0.03 < score.value and score.low < score.value < score.high
-    assert ahead_of(verdict, verdict).value == 0.0
+    assert scores_of([verdict], [verdict])["first_ahead"].value == 0.0
     assert any((tmp_path / "run" / "tensorboard").iterdir())
 
 

@@ -94,7 +94,7 @@ def eval_command(
 ) -> None:
     """Score trained networks on every set and compare the first with the others."""
     _need("torch", "torch_geometric", "safetensors", *([] if pictures is None else ["sklearn"]))
-    from swarmscope.learning.evaluate import data_key, open_trained, read_test
+    from swarmscope.learning.evaluate import data_key, open_trained, read_test, scores_of
     from swarmscope.learning.records import SPLITS
 
     if split not in SPLITS:
@@ -108,7 +108,7 @@ def eval_command(
         shards = read_test(data, expand(sets), split)
     result: dict[str, Any] = {"data": data_key(data, list(shards)), "split": split, "sets": {}}
     everything = _score_sets(networks, shards, result, out)
-    result["mean"] = [_means(kept, everything[0]) for kept in everything]
+    result["mean"] = [_plain(scores_of(kept, everything[0])) for kept in everything]
     console, labels = PlainConsole(width=None if sys.stdout.isatty() else 170), [one.label for one in networks]
     for table in (_accuracy_table, _difference_table, _regret_table):
         console.print(table(result, labels))
@@ -125,7 +125,7 @@ def _score_sets(
     networks: Sequence[Any], shards: dict[str, Any], result: dict[str, Any], out: Path | None
 ) -> list[list[Any]]:
     """Score the networks set by set into ``result``, kept in ``out``; return each network's verdicts."""
-    from swarmscope.learning.evaluate import ahead_of, coin_regret, judge, lost_on_the_radio, majority, regret, share
+    from swarmscope.learning.evaluate import coin_regret, judge, majority, scores_of
 
     everything: list[list[Any]] = [[] for _ in networks]
     with _bar() as bar:
@@ -135,11 +135,8 @@ def _score_sets(
             rows = []
             for one, kept, verdict in zip(networks, everything, verdicts, strict=True):
                 kept.append(verdict)
-                scores = {
-                    "accuracy": share(verdict.hit, verdict.map), "regret_m": regret(verdict),
-                    "first_ahead": ahead_of(verdicts[0], verdict), "lost_on_the_radio": lost_on_the_radio(verdict),
-                }  # fmt: skip
-                rows.append({"label": one.label, "sha256": one.sha256} | {k: s._asdict() for k, s in scores.items()})
+                scores = scores_of([verdict], [verdicts[0]])
+                rows.append({"label": one.label, "sha256": one.sha256} | _plain(scores))
             about = {"samples": shard.samples, "majority": majority(shard), "coin_regret_m": coin_regret(shard)}
             result["sets"][name] = about | {"networks": rows}
             if out is not None:
@@ -277,16 +274,8 @@ def _words(score: Any) -> str:
     return f"{100 * score['value']:.2f} ({100 * score['low']:.1f}-{100 * score['high']:.1f})"
 
 
-def _means(verdicts: Sequence[Any], first: Sequence[Any]) -> dict[str, Any]:
-    """Return means over the sets: accuracy, how far the ``first`` network is ahead, what bytes cost."""
-    from swarmscope.learning.evaluate import mean_share
-
-    values = {
-        "accuracy": [(v.hit, v.map) for v in verdicts],
-        "first_ahead": [(a.hit.astype(float) - v.hit, v.map) for a, v in zip(first, verdicts, strict=True)],
-        "lost_on_the_radio": [(v.hit.astype(float) - v.hit_as_sent, v.map) for v in verdicts],
-    }
-    return {name: mean_share(parts)._asdict() for name, parts in values.items()}
+def _plain(scores: dict[str, Any]) -> dict[str, Any]:
+    return {name: score._asdict() for name, score in scores.items()}
 
 
 def _accuracy_table(result: dict[str, Any], labels: list[str]) -> Table:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -74,25 +74,27 @@ def grouped(runs: Iterable[Run]) -> dict[tuple[str, str], list[Run]]:
 def paired(ours: list[Run], others: list[Run], metric: str) -> PairedDifference:
     """Return the mean difference ours - other of one figure over the maps (seeds) that both have it on.
 
-    Mean path lengths are of the robots that arrived with both.
+    Mean path lengths are of the robots that arrived with both and had to move.
     """
     mine = {run.seed: run.figures.get(metric) for run in ours}
     theirs = {run.seed: run.figures.get(metric) for run in others}
     if metric in PATH_LENGTHS:
-        other = {run.seed: run for run in others}
-        pairs = {run.seed: common_paths(run, other[run.seed]) for run in ours if run.seed in other}
-        mine = {seed: pair[0] for seed, pair in pairs.items()}
-        theirs = {seed: pair[1] for seed, pair in pairs.items()}
+        mine, theirs = {}, {}
+        for run, other, both in in_common(ours, others):
+            moved = both & (other.travelled_m > 0.0)
+            if moved.any():
+                mine[run.seed] = float(run.travelled_m[moved].mean())
+                theirs[run.seed] = float(other.travelled_m[moved].mean())
     seeds = [s for s in sorted(mine.keys() & theirs.keys()) if mine[s] is not None and theirs[s] is not None]
     return paired_difference([mine[s] for s in seeds], [theirs[s] for s in seeds])  # type: ignore[arg-type]
 
 
-def common_paths(run: Run, other: Run) -> tuple[float | None, float | None]:
-    """Return the mean ways [m] of the robots that arrived in both runs and had to move; None without any."""
-    both = np.isfinite(run.arrival_s) & np.isfinite(other.arrival_s) & (other.travelled_m > 0.0)
-    if not both.any():
-        return None, None
-    return float(run.travelled_m[both].mean()), float(other.travelled_m[both].mean())
+def in_common(runs: Iterable[Run], others: Iterable[Run]) -> Iterator[tuple[Run, Run, NDArray[np.bool_]]]:
+    """Yield the runs of maps that both have, and which robots (N,) arrived in both."""
+    of_seed = {run.seed: run for run in others}
+    for run in (run for run in runs if run.seed in of_seed):
+        other = of_seed[run.seed]
+        yield run, other, np.isfinite(run.arrival_s) & np.isfinite(other.arrival_s)
 
 
 class PathGap(NamedTuple):
@@ -108,11 +110,9 @@ class PathGap(NamedTuple):
 
 def path_gap(runs: list[Run], worst: list[Run], best: list[Run]) -> PathGap:
     """Return where the path lengths of ``runs`` lie between those of ``worst`` and ``best`` in the same worlds."""
-    far, near = {run.seed: run for run in worst}, {run.seed: run for run in best}
+    near = {run.seed: run for run in best}
     shorter, longest, gained, whole, robots = [], [], [], [], 0
-    for run in (run for run in runs if run.seed in far):
-        other = far[run.seed]
-        both = np.isfinite(run.arrival_s) & np.isfinite(other.arrival_s)
+    for run, other, both in in_common(runs, worst):
         saved = other.travelled_m - run.travelled_m
         robots += int(np.count_nonzero(other.travelled_m[both]))
         if other.travelled_m[both].any():
@@ -132,11 +132,9 @@ def flow_time_increases(runs: Iterable[Run], others: Iterable[Run]) -> tuple[Flo
 
     ``l*`` is the way by A*.
     """
-    of_seed = {run.seed: run for run in others}
     mine, theirs = [np.zeros(0)], [np.zeros(0)]
-    for run in (run for run in runs if run.seed in of_seed):
-        other = of_seed[run.seed]
-        chosen = np.isfinite(run.arrival_s) & np.isfinite(other.arrival_s) & (run.shortest_m > 0.0)
+    for run, other, both in in_common(runs, others):
+        chosen = both & (run.shortest_m > 0.0)
         mine.append(run.travelled_m[chosen] / run.shortest_m[chosen] - 1.0)
         theirs.append(other.travelled_m[chosen] / run.shortest_m[chosen] - 1.0)
     return np.concatenate(mine), np.concatenate(theirs)

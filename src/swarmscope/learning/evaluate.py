@@ -165,19 +165,20 @@ def _resampled(
     return means
 
 
-def ahead_of(one: Verdict, other: Verdict) -> Score:
-    """Return by how much ``one`` is right more often than ``other`` on the same samples."""
-    return share(one.hit.astype(np.float64) - other.hit, one.map)
+def scores_of(verdicts: Sequence[Verdict], first: Sequence[Verdict]) -> dict[str, Score]:
+    """Return means over the sets that ``verdicts`` are of; ``first`` are another network's on the same samples.
 
-
-def lost_on_the_radio(verdict: Verdict) -> Score:
-    """Return by how much less often sides are right with features in bytes."""
-    return share(verdict.hit.astype(np.float64) - verdict.hit_as_sent, verdict.map)
-
-
-def regret(verdict: Verdict) -> Score:
-    """Return the mean detour [m] that wrong sides cost."""
-    return share(np.where(verdict.hit, 0.0, verdict.detour_m.astype(np.float64)), verdict.map)
+    accuracy, how much more often ``first`` is right, how much less often sides are right with features in bytes, and
+    the mean detour [m] that wrong sides cost.
+    """
+    values = {
+        "accuracy": [v.hit for v in verdicts],
+        "regret_m": [np.where(v.hit, 0.0, v.detour_m.astype(np.float64)) for v in verdicts],
+        "first_ahead": [a.hit.astype(np.float64) - v.hit for a, v in zip(first, verdicts, strict=True)],
+        "lost_on_the_radio": [v.hit.astype(np.float64) - v.hit_as_sent for v in verdicts],
+    }
+    maps = [v.map for v in verdicts]
+    return {name: mean_share(list(zip(parts, maps, strict=True))) for name, parts in values.items()}
 
 
 def coin_regret(data: Shard) -> float:

@@ -4,8 +4,9 @@
 area ahead. Task I: starts and goals anywhere, at least 7 m apart. Task II: a column somewhere between the left side and
 the middle, each robot up to ``RAGGED_M`` ahead or behind; goals on the right side, opposite.
 
-*driven*: DH-Bug drives the robots of tasks GIWT_1 (everybody moves) and GIWT_2; each of its key points counts. The
-document calls that too slow; here a run takes a fraction of a second, and the data is of what happens in use.
+*driven*: DH-Bug, set as planner ``giwt`` is, drives the robots of tasks GIWT_1 (everybody moves) and GIWT_2; each of
+its key points counts. The document calls that too slow; here a run takes a fraction of a second, and the data is of
+what happens in use.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from swarmscope.learning.labels import LABELLED, OUTCOMES, Label, label
 from swarmscope.learning.views import look
 from swarmscope.onboard.percept import Rig
 from swarmscope.onboard.perception.local_map import encode_scan, hide_robot
-from swarmscope.onboard.planning import dh_bug
+from swarmscope.onboard.planning import _giwt, dh_bug
 from swarmscope.onboard.planning._giwt_graph import GRID_M
 from swarmscope.sim.lidar import Beams, make_beams
 from swarmscope.sim.loop import run
@@ -42,8 +43,6 @@ CASES = 4
 RAGGED_M = 1.0
 COLUMN_M = (0.7, 11.0)
 """Where a column can be."""
-KEY_DEG = 60.0
-"""Where driven robots have to choose, as planner ``giwt`` has it."""
 LIMIT_S = 90.0
 """Length of a driven run."""
 TRIES = 3000
@@ -175,7 +174,7 @@ def _driven(rng: np.random.Generator, options: MapOptions, task: str, counts: Co
         return
     recorder = Recorder(rig)
     seed, turn = int(rng.integers(2**31)), int(rng.choice([dh_bug.TURN_RANDOM, dh_bug.TURN_NEAREST]))
-    params = dh_bug.Params(turn=turn, seed=int(rng.integers(2**31)), sector=0, key_deg=KEY_DEG)
+    params = dh_bug.Params(turn=turn, seed=int(rng.integers(2**31)), sector=0, key_deg=_giwt.Params().key_deg)
     setting = make_setting(scenario, setup)
     setting = replace(setting, planner=recorder, record_scans=False, seed=seed, params=params)
     trace = run(setting)

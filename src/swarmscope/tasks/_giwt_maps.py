@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,16 +42,39 @@ class MapOptions:
     apart_m: float = 7.0  # from a start to its goal, at least (task I)
 
 
+class Sizes(NamedTuple):
+    """Where obstacles stand and how large they are [m]."""
+
+    floor_m: Range
+    """Centres are on (0, 0) to this corner."""
+    side_m: Range
+    """Of rectangles, from least to most."""
+    radius_m: Range
+    """Of cylinders, from least to most."""
+
+
 def draw_map(rng: np.random.Generator, options: MapOptions, keep_free: Floats, free_m: float) -> WorldSpec:
     """Return a walled map whose obstacles stay ``free_m`` [m] off the points ``keep_free (K, 2)`` [m]."""
+    sizes = Sizes((options.size_m, options.size_m), SIDE_M, RADIUS_M)
+    counts = (options.fewest, options.most)
+    return walled(draw_obstacles(rng, options.obstacles, counts, sizes, keep_free, free_m), options.size_m)
+
+
+def draw_obstacles(
+    rng: np.random.Generator, kind: Kind, counts: Range, sizes: Sizes, keep_free: Floats, free_m: float
+) -> list[Obstacle]:
+    """Return obstacles, from the first to the second of ``counts``, ``free_m`` [m] off the points ``keep_free (K, 2)``.
+
+    One for which REDRAWS places are not enough is left out.
+    """
     obstacles: list[Obstacle] = []
-    for _ in range(int(rng.integers(int(options.fewest), int(options.most) + 1))):
+    for _ in range(int(rng.integers(int(counts[0]), int(counts[1]) + 1))):
         for _ in range(REDRAWS):
-            one = draw_obstacle(rng, options.obstacles, (options.size_m, options.size_m), SIDE_M, RADIUS_M)
-            if stays_off(one, keep_free, free_m):
+            one = _draw_obstacle(rng, kind, sizes)
+            if _stays_off(one, keep_free, free_m):
                 obstacles.append(one)
                 break
-    return walled(obstacles, options.size_m)
+    return obstacles
 
 
 def walled(obstacles: Sequence[Obstacle], size: float) -> WorldSpec:
@@ -61,21 +84,21 @@ def walled(obstacles: Sequence[Obstacle], size: float) -> WorldSpec:
     return WorldSpec.model_construct(obstacles=[*closed_room(0.0, 0.0, size, size), *obstacles], bounds=bounds)
 
 
-def draw_obstacle(rng: np.random.Generator, kind: Kind, floor: Range, side: Range, radius: Range) -> Obstacle:
-    """Return a rectangle (A) or a cylinder (B), or one of both (C), with its centre on ``floor`` (x, y) [m]."""
+def _draw_obstacle(rng: np.random.Generator, kind: Kind, sizes: Sizes) -> Obstacle:
+    """Return a rectangle (A) or a cylinder (B), or one of both (C)."""
     if kind == "C":
         kind = "A" if rng.random() < 0.5 else "B"
-    x, y = (float(v) for v in rng.uniform(0.0, floor, 2))
+    x, y = (float(v) for v in rng.uniform(0.0, sizes.floor_m, 2))
     if kind == "B":
-        return Circle.model_construct(type="circle", center=(x, y), radius=float(rng.uniform(*radius)))
-    a, b = 0.5 * rng.uniform(*side, 2)
+        return Circle.model_construct(type="circle", center=(x, y), radius=float(rng.uniform(*sizes.radius_m)))
+    a, b = 0.5 * rng.uniform(*sizes.side_m, 2)
     yaw = rng.uniform(0.0, math.pi)
     c, s = math.cos(yaw), math.sin(yaw)
     corners = [(x + c * u - s * v, y + s * u + c * v) for u, v in ((a, b), (-a, b), (-a, -b), (a, -b))]
     return Polygon.model_construct(type="polygon", points=[(float(px), float(py)) for px, py in corners])
 
 
-def stays_off(obstacle: Obstacle, points: Floats, distance: float) -> bool:
+def _stays_off(obstacle: Obstacle, points: Floats, distance: float) -> bool:
     """Tell whether no point is in the obstacle or closer to it than ``distance``."""
     if not len(points):
         return True

@@ -11,13 +11,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from swarmscope.sim.world import Obstacle, WorldSpec
+from swarmscope.sim.world import WorldSpec
 from swarmscope.tasks._check import Reach, unreachable
 from swarmscope.tasks._contract import Option, Setup, check_robots, read_options
 from swarmscope.tasks._forest import smallest_spacing
-from swarmscope.tasks._giwt_maps import REDRAWS, Kind, check_counts, draw_obstacle, stays_off, unsolvable
+from swarmscope.tasks._giwt_maps import Kind, Sizes, check_counts, draw_obstacles, unsolvable
 from swarmscope.tasks._rooms import WALL_M, closed_room
 
 NAME = "GIWT_lab"
@@ -28,8 +27,6 @@ RADIUS_M = (0.2, 0.8)
 EDGE_M = 0.5  # from the walls to the surface of robots that start or arrive
 FREE_M = 0.35  # from them to an obstacle, beyond the robot's radius
 DRAWS = 50
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -53,23 +50,12 @@ def make(seed: int, robots: int = 5, radius: float = 0.15, **options: Option) ->
     starts = np.column_stack([x, np.full(robots, aside), np.full(robots, 0.5 * math.pi)])
     goals = np.column_stack([x, np.full(robots, length - aside)])
     keep_free, walls = np.vstack([starts[:, :2], goals]), closed_room(0.0, 0.0, width, length)
+    counts, sizes = (chosen.fewest, chosen.most), Sizes((width, length), SIDE_M, RADIUS_M)
     bounds = (-WALL_M, -WALL_M, width + WALL_M, length + WALL_M)
     for draw in range(DRAWS):
         rng = np.random.default_rng([seed, draw])
-        things = _draw_things(rng, chosen, (width, length), keep_free, radius + FREE_M)
+        things = draw_obstacles(rng, chosen.obstacles, counts, sizes, keep_free, radius + FREE_M)
         setup = Setup(WorldSpec(obstacles=[*walls, *things], bounds=bounds), starts, goals)
         if unreachable(setup, Reach(radius)).size == 0:
             return setup
     raise unsolvable(NAME, seed, DRAWS, "somebody cannot reach its goal")
-
-
-def _draw_things(
-    rng: np.random.Generator, options: LabOptions, floor: tuple[float, float], keep_free: Floats, free: float
-) -> list[Obstacle]:
-    """Return what stands on the floor, ``free`` [m] off the points ``keep_free (K, 2)``."""
-    things = []
-    for _ in range(int(rng.integers(int(options.fewest), int(options.most) + 1))):
-        tries = (draw_obstacle(rng, options.obstacles, floor, SIDE_M, RADIUS_M) for _ in range(REDRAWS))
-        one = next((thing for thing in tries if stays_off(thing, keep_free, free)), None)
-        things += [] if one is None else [one]
-    return things

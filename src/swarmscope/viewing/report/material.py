@@ -41,6 +41,7 @@ class Material:
         self.places = list(experiment.places)
         self.planners = list(experiment.planners)
         self._figures: dict[tuple[str, str, str], Interval] = {}
+        self._gaps: dict[tuple[str, str], PathGap] = {}
 
     def of(self, place: str, planner: str) -> list[Run]:
         """Return the runs of a planner in a place, or in all places."""
@@ -79,7 +80,10 @@ class Material:
         asked = self.experiment.gap
         if asked is None or not all(self.of(place, name) for name in (planner, asked.worst, asked.best)):
             return None
-        return path_gap(*(self.of(place, name) for name in (planner, asked.worst, asked.best)))
+        if (place, planner) not in self._gaps:
+            three = (self.of(place, name) for name in (planner, asked.worst, asked.best))
+            self._gaps[place, planner] = path_gap(*three)
+        return self._gaps[place, planner]
 
     def published(self, metric: str, place: str, planner: str) -> float | None:
         """Return the published value, if there is one."""

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from swarmscope.errors import UnknownNameError
 from swarmscope.evaluation.results import Run, TimeBudget, time_budget
-from swarmscope.evaluation.statistics import Interval, PairedDifference
+from swarmscope.evaluation.statistics import PairedDifference
 from swarmscope.evaluation.weight import NEIGHBOUR_PRINTED, SELF_PRINTED, WEIGHT_PRINTED, WeightResult
 from swarmscope.onboard.planning._contract import load_planner
 from swarmscope.viewing.report import words
@@ -144,9 +144,13 @@ def _gap(material: Material, place: str, planner: str) -> Value:
         return [Line(NOT_RUN, "plain")]
     if found.reduction.used == 0:
         return [Line("no robot in common", "plain")]
-    lines = cell(_share(found.reduction), _shares(found.reduction))
+    shorter, closed = (
+        (words.value(name, part.estimate), words.interval(name, part))
+        for name, part in (("path_reduction", found.reduction), ("gap_closed", found.closed))
+    )
+    lines = cell(*shorter)
     if planner != asked.best:
-        lines.append(Line(f"closes {_share(found.closed)} {_shares(found.closed)}".rstrip(), "sub"))
+        lines.append(Line(f"closes {' '.join(closed)}".rstrip(), "sub"))
     entered = f"{words.count(found.robots, 'robot')}, {words.count(found.reduction.used, 'map')}"
     lines.append(Line(entered, "sub"))
     ours, worst, best = (material.published(GAP_METRIC, place, name) for name in (planner, asked.worst, asked.best))
@@ -159,15 +163,6 @@ def _gap(material: Material, place: str, planner: str) -> Value:
     outside = not found.reduction.low <= printed <= found.reduction.high and math.isfinite(found.reduction.low)
     mark: Mark = "" if not outside else "good" if found.reduction.estimate > printed else "bad"
     return [*lines, Line(text.replace("-", "−"), "sub", mark)]
-
-
-def _share(found: Interval) -> str:
-    return f"{100.0 * found.estimate:.1f} %".replace("-", "−") if math.isfinite(found.estimate) else words.MISSING
-
-
-def _shares(found: Interval) -> str:
-    bounds = f"[{100.0 * found.low:.1f}, {100.0 * found.high:.1f}]".replace("-", "−")
-    return bounds if math.isfinite(found.low) else ""
 
 
 def failure_table(material: Material) -> Table:
