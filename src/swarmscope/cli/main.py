@@ -43,7 +43,7 @@ Controllers = Annotated[
 DiskMap = Annotated[str, typer.Option("--map", help="c0, u, crevice, one-disc, minima, empty, random:SEED, FILE.yaml.")]
 Permutation = Annotated[str | None, typer.Option(help="Goals of robots 0, 1, ...: 0,3,1,4,2. Else 0,1,2,...")]
 ExperimentFile = Annotated[str, typer.Argument(metavar="FILE", help="Experiment file (YAML), or a shipped one's name.")]
-Maps = Annotated[int | None, typer.Option(min=1, help="Only the first so many seeds (the papers have 20).")]
+Maps = Annotated[int | None, typer.Option(min=1, help="Only the first so many seeds (the papers have 20; GIWT 500).")]
 EngineName = Annotated[str, typer.Option(help="in-process, local (processes) or ray (machines).")]
 Workers = Annotated[int | None, typer.Option(min=1, help="Processes, else one for each core.")]
 Address = Annotated[str | None, typer.Option(help="Of a Ray cluster; 'auto' for the one this machine belongs to.")]
@@ -150,10 +150,11 @@ def tasks() -> None:
     epilog="Examples:\n\n"
     "[bold]swarmscope reproduce nav-scope --maps 20[/bold]\n\n"
     "[bold]swarmscope reproduce sfm-mas[/bold]\n\n"
+    "[bold]swarmscope reproduce giwt --maps 20[/bold]\n\n"
     "[bold]swarmscope reproduce nav-scope --engine ray --address auto[/bold]"
 )
 def reproduce(
-    name: Annotated[str, typer.Argument(help="nav-scope, sfm-mas, depository or traps.")],
+    name: Annotated[str, typer.Argument(help="nav-scope, sfm-mas, depository, traps or giwt.")],
     maps: Maps = None,
     engine: EngineName = "local",
     workers: Workers = None,

@@ -112,8 +112,8 @@ def _check_available(scenarios: list[Scenario]) -> None:
 
 def _warm_up(planners: set[str], engine: Engine, say: Callable[[str], None] | None) -> None:
     """Compile what has to be compiled once, instead of in every worker at the same time."""
-    for job in warm_up_jobs(sorted(planners)):
-        if say is not None:
-            say("compiling kernels for the first time (up to a minute, kept on disk) ...")
+    for k, job in enumerate(jobs := warm_up_jobs(sorted(planners))):
+        if say is not None and k == 0:
+            say(f"compiling kernels of {len(jobs)} planners for the first time (a minute or two, kept on disk) ...")
         for _ in engine.answers(iter([job])):
             pass

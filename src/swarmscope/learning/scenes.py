@@ -26,7 +26,7 @@ from swarmscope.learning.labels import LABELLED, OUTCOMES, Label, label
 from swarmscope.learning.views import look
 from swarmscope.onboard.percept import Rig
 from swarmscope.onboard.perception.local_map import encode_scan, hide_robot
-from swarmscope.onboard.planning import _giwt, dh_bug
+from swarmscope.onboard.planning import dh_bug
 from swarmscope.onboard.planning._giwt_graph import GRID_M
 from swarmscope.sim.lidar import Beams, make_beams
 from swarmscope.sim.loop import run
@@ -174,7 +174,7 @@ def _driven(rng: np.random.Generator, options: MapOptions, task: str, counts: Co
         return
     recorder = Recorder(rig)
     seed, turn = int(rng.integers(2**31)), int(rng.choice([dh_bug.TURN_RANDOM, dh_bug.TURN_NEAREST]))
-    params = dh_bug.Params(turn=turn, seed=int(rng.integers(2**31)), sector=0, key_deg=_giwt.Params().key_deg)
+    params = dh_bug.Params(turn=turn, seed=int(rng.integers(2**31)), long_gaps=1)
     setting = make_setting(scenario, setup)
     setting = replace(setting, planner=recorder, record_scans=False, seed=seed, params=params)
     trace = run(setting)

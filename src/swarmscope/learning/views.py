@@ -13,7 +13,7 @@ from swarmscope.onboard.percept import Rig, Sensor
 from swarmscope.onboard.perception.local_map import encode_scan, hide_robot
 from swarmscope.onboard.perception.safety import beam_of, safe_directions
 from swarmscope.onboard.planning._giwt_graph import GRID_M
-from swarmscope.onboard.planning.dh_bug import PRINTED_RULE
+from swarmscope.onboard.planning.dh_bug import SECTOR_RULE
 from swarmscope.sim.lidar import Beams, cast_disc, cast_static
 from swarmscope.sim.sensing import SIGHT_SLACK
 from swarmscope.sim.world import World
@@ -59,7 +59,7 @@ def _look(
     for i in range(places.shape[0]):
         x, y = places[i, 0], places[i, 1]
         cast_static(world, x, y, 0.0, beams, ranges)
-        safe_directions(ranges, sensor.range_min, sensor.range_max, sensor.wraps, rig.reach[PRINTED_RULE], edges, safe)
+        safe_directions(ranges, sensor.range_min, sensor.range_max, sensor.wraps, rig.reach[SECTOR_RULE], edges, safe)
         bearing = math.atan2(goals[i, 1] - y, goals[i, 0] - x)
         ahead = beam_of(bearing, sensor.angle_min, sensor.increment, sensor.beams, sensor.wraps)
         blocked[i] = safe[ahead] == 0

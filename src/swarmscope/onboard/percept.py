@@ -219,6 +219,7 @@ def make_rig(
         (narrow or protection.r, 0.0, 0.0, 0.0),
         (protection.r, 0.0, 0.0, 0.0),
         (protection.l_th, 0.5 * protection.alpha, 0.0, 0.0),
+        (protection.l_th, 0.0, 0.0, 0.0),
     )
     reach = np.stack([reach_table(sensor.increment, sensor.range_max, footprint, *rule) for rule in rules])
     return Rig(

@@ -96,6 +96,14 @@ def test_without_the_sector_a_gap_is_taken_that_the_body_fits_through():
     assert closed.mode != MODE_B
 
 
+@pytest.mark.parametrize(("ahead", "short", "long"), [(0.9, True, False), (1.3, True, True), (0.5, False, False)])
+def test_how_far_a_way_must_be_free(ahead, short, long):
+    """l_th is 0.6 m; with long gaps it is 1.2 m."""
+    ring = [((ahead + 0.5) * math.cos(a), (ahead + 0.5) * math.sin(a), 0.5) for a in np.linspace(-1.5, 1.5, 31)]
+    for long_gaps, free in ((0, short), (1, long)):
+        assert (Robot(long_gaps=long_gaps).face(ring).step().mode == MODE_B) == free
+
+
 @pytest.mark.parametrize(("turn", "side", "turns", "follows"), [(0, 1, MODE_C, MODE_E), (1, -1, MODE_D, MODE_F)])
 def test_at_a_key_point_it_turns_and_then_follows(turn, side, turns, follows):
     robot = Robot(turn=turn).face(BIG).step()

@@ -251,9 +251,9 @@ def test_it_asks_on_the_way_before_it_has_to_stand(model):
     sensor = robots.rig.sensor
     bearing = sensor.angle_min + sensor.increment * np.arange(sensor.beams) - robots.percepts["goal_bearing"][0]
     bay = np.abs((bearing + math.pi) % (2.0 * math.pi) - math.pi) < math.radians(85.0)
-    robots.ranges[0] = np.where(bay, 1.6, np.inf)
-    assert robots.step().sent(0) == []  # 0.5 s from where a side has to be chosen is 1.45 m from the bay's end
-    robots.ranges[0] = np.where(bay, 1.35, np.inf)
+    robots.ranges[0] = np.where(bay, 1.0, np.inf)
+    assert robots.step().sent(0) == []  # 0.5 s from where a side has to be chosen is 0.85 m from the bay's end
+    robots.ranges[0] = np.where(bay, 0.75, np.inf)
     robots.step()
     assert robots.decisions["v"][0] > 0.0
     assert [header[0] for _, header, _ in robots.sent(0)] == [KIND_DIRECTED_REQUEST]

@@ -53,7 +53,7 @@ from swarmscope.onboard.planning._giwt_network import (
     load_network,
     read_card,
 )
-from swarmscope.onboard.planning.dh_bug import AT_GOAL, GAP_RULE, KEY_POINT, toss
+from swarmscope.onboard.planning.dh_bug import AT_GOAL, BODY_RULE, KEY_POINT, toss
 from swarmscope.onboard.sharing.inbox import answer_directed, ask_direction, start_round, waiting_for_answers
 from swarmscope.onboard.sharing.message import direction_of, read_latent
 from swarmscope.onboard.tick import begin, finish
@@ -103,7 +103,7 @@ Driving = dh_bug.Params
 def _driving(params: Params) -> Driving:
     """Return what DH-Bug's kernels are told."""
     return Driving(
-        dh_bug.TURN_RANDOM, params.seed, 0, 0, params.key_deg, params.face_deg, params.turn_back_deg,
+        dh_bug.TURN_RANDOM, params.seed, 0, 0, 0, params.key_deg, params.face_deg, params.turn_back_deg,
         params.arrive_m, params.creep, params.still_s, params.wait_m, params.wait_s,
     )  # fmt: skip
 
@@ -419,7 +419,7 @@ def key_point_near(
     for n in range(sensor.beams):
         nearer[n] = max(sensor.range_min, work[n] - way) if work[n] >= sensor.range_min else work[n]
     safe_directions(
-        nearer, sensor.range_min, sensor.range_max, sensor.wraps, rig.reach[GAP_RULE], edges, safe
+        nearer, sensor.range_min, sensor.range_max, sensor.wraps, rig.reach[BODY_RULE], edges, safe
     )
     turn = min(turn_to_safe(percept, safe, 1, rig), turn_to_safe(percept, safe, -1, rig))
     return bool(turn > math.radians(params.key_deg))
@@ -472,7 +472,7 @@ def prepare(
         if shared["ask_direction"][q] >= 0:
             memory["thinks"] = 1
     sensor = rig.sensor
-    safe_directions(work, sensor.range_min, sensor.range_max, sensor.wraps, rig.reach[GAP_RULE], edges, safe)
+    safe_directions(work, sensor.range_min, sensor.range_max, sensor.wraps, rig.reach[BODY_RULE], edges, safe)
     if dh_bug.advance(ranges, work, percept, shared, memory, decision, safe, rig, _driving(params)):
         memory["stage"] = DRIVES
         horizon = max(rig.look_ahead, rig.protection.l_th) + params.ask_ahead_s * rig.body.v_max

@@ -1,9 +1,8 @@
 """DH-Bug (GIWT 4.2): straight to the goal, along what is in the way, and one choice of side at every key point.
 
-The distance histogram is the scan cut at l_th; a direction is safe when the printed sector (60 degrees wide) and the
-swept footprint are free up to l_th. There is no look-ahead, and nothing is said to anybody. With ``sector`` 0 a
-direction is safe when what the body sweeps is free for 1.2 m (``safety.narrow_m``): gaps that the body fits through are
-taken, as GIWT's safe zone (1) has it.
+The distance histogram is the scan cut at l_th; a direction is safe when what the body sweeps is free up to l_th, as
+GIWT's safe zone (1) has it: gaps that the body fits through are taken. There is no look-ahead, and nothing is said to
+anybody. ``sector`` 1 asks for the lab's sector (60 degrees wide) to be free, too.
 
 A      turns to the goal, or to the edge beside it; B drives there
 key    no safe direction within ``key_deg`` of the goal: ``choose_turn`` gives a side; that is all an optimiser replaces
@@ -20,8 +19,8 @@ Where the published rules leave a robot standing or turning for nothing, another
 - The leave condition compares with the key point's distance during the whole following: goal nearer than there, and
   5 to 170 degrees on the free side of the direction followed.
 - Loop breakers: back at a logged pose, or 390 degrees of turning on the spot. The robot faces the goal anew, chooses
-  its next side by a toss, because the same choice has just led in a circle, and until a following ends properly takes
-  the gaps that its body fits through (free for 1.2 m) instead of those as wide as the sector.
+  its next side by a toss, because the same choice has just led in a circle, and needs no sector until a following ends
+  properly.
 - (2) counts returns within alpha/2 of the heading, like the lab's code: with all of them it is 0 beside every wall. It
   never goes below ``creep``; what is safe is the guard's decision.
 - Moving robots are left to 4.2.3 and the guard; one that stands for ``still_s`` is an obstacle.
@@ -72,8 +71,8 @@ MODE_NAMES = ("standby", "A", "B", "key point", "C", "D", "E", "F", "at the goal
 STATES = np.array([DECIDE, ADVANCE, ADVANCE, DECIDE, FOLLOW, FOLLOW, FOLLOW, FOLLOW, ARRIVED], np.uint8)
 """What a mode is shown as."""
 TURN_LEFT, TURN_RIGHT, TURN_RANDOM, TURN_NEAREST = range(4)
-PRINTED_RULE, GAP_RULE, ESCAPE_RULE = 3, 1, 2
-"""Rows of ``Rig.reach``: sector and footprint within l_th; gaps that the body fits through; what is free within r."""
+BODY_RULE, SECTOR_RULE, LONG_GAP_RULE, ESCAPE_RULE = 4, 3, 1, 2
+"""Rows of ``Rig.reach``: footprint within l_th; with the sector; footprint within 1.2 m; what is free within r."""
 LOG = 184
 LOG_M = 0.07
 """Poses of a following are logged this far apart [m]; when ``LOG`` are known, every other one is forgotten."""
@@ -102,9 +101,11 @@ class Params(NamedTuple):
     """Of the random side, together with the robot's address and the number of its choices."""
     told: int = 0
     """1: an oracle's side is taken where one is given."""
-    sector: int = 1
-    """0: a direction needs no free sector, only room for the body."""
-    key_deg: float = 80.0
+    sector: int = 0
+    """1: a direction needs a free sector, not only room for the body."""
+    long_gaps: int = 0
+    """1: room for the body is needed for ``safety.narrow_m`` (1.2 m) instead of l_th. Expert data was made so."""
+    key_deg: float = 60.0
     """pi/2 - theta_1: with no safe direction this close to the goal's there is a key point."""
     face_deg: float = 10.0
     """theta_0: with less than this to turn, mode A becomes B."""
@@ -204,7 +205,9 @@ def step(
         scratch.header[row], angles, distances, rig, params.still_s,
     )  # fmt: skip
     sensor = rig.sensor
-    rule = PRINTED_RULE if params.sector and not memory["looped"] else GAP_RULE
+    rule = LONG_GAP_RULE if params.long_gaps else BODY_RULE
+    if params.sector and not memory["looped"]:
+        rule = SECTOR_RULE
     safe_directions(work, sensor.range_min, sensor.range_max, sensor.wraps, rig.reach[rule], edges, safe)
     if not advance(ranges, work, percept, shared, memory, decision, safe, rig, params):
         if memory["mode"] == KEY_POINT:
