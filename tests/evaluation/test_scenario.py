@@ -20,6 +20,7 @@ from swarmscope.evaluation.scenario import (
     parse_scenario,
     task_options,
 )
+from swarmscope.onboard.planning.dh_bug import toss
 from swarmscope.sim.maps import packaged_map
 from swarmscope.tasks import load_task, task_names
 
@@ -225,3 +226,18 @@ def test_any_group_is_valid_or_named(group, content):
         parse_scenario({**T1, group: content}, "test")
     except SwarmscopeError as error:
         assert str(error).startswith("test")
+
+
+def test_what_is_tossed_for_depends_on_the_seed_of_the_run():
+    """Else every robot would toss for the same sides in every world."""
+
+    def sides(seed, own=0):
+        values = {"task": {"name": "T1"}, "seed": seed, "planner": {"name": "dh-bug", "params": {"seed": own}}}
+        scenario = parse_scenario(values, "test")
+        params = make_setting(scenario, make_setup(scenario)).params
+        return [toss(params.seed, robot, count) for robot in range(15) for count in range(4)]
+
+    assert sides(7) == sides(7)
+    assert sides(7) != sides(8)
+    assert sides(7) != sides(7, own=1)
+    assert abs(np.mean([sides(seed)[0] for seed in range(40)])) < 0.5

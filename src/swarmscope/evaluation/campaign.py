@@ -114,6 +114,6 @@ def _warm_up(planners: set[str], engine: Engine, say: Callable[[str], None] | No
     """Compile what has to be compiled once, instead of in every worker at the same time."""
     for k, job in enumerate(jobs := warm_up_jobs(sorted(planners))):
         if say is not None and k == 0:
-            say(f"compiling kernels of {len(jobs)} planners for the first time (a minute or two, kept on disk) ...")
+            say(f"compiling kernels of {len(jobs)} planner(s) for the first time (a minute or two, kept on disk) ...")
         for _ in engine.answers(iter([job])):
             pass

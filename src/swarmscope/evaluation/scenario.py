@@ -332,6 +332,13 @@ def planner_of(chosen: PlannerModel) -> Any:
     return planner if chosen.model is None else planner.with_model(chosen.model)
 
 
+def _with_run_seed(params: Any, seed: int) -> Any:
+    """Return the parameters of a planner for one run: what it tosses for also depends on the scenario's ``seed``."""
+    if "seed" not in params._fields:
+        return params
+    return params._replace(seed=int(np.random.SeedSequence([seed, int(params.seed)]).generate_state(1)[0]))
+
+
 def make_setting(scenario: Scenario, setup: Setup, threads: int = 1) -> Setting:
     """Return the run of ``scenario`` in ``setup``, ready for the kernels."""
     planner = planner_of(scenario.planner)
@@ -346,7 +353,7 @@ def make_setting(scenario: Scenario, setup: Setup, threads: int = 1) -> Setting:
         beams=make_beams(scenario.lidar.beams, math.radians(scenario.lidar.fov_deg), scenario.lidar.range_m),
         rig=make_rig_of(scenario),
         planner=planner,
-        params=make_params(planner, scenario.planner.params),
+        params=_with_run_seed(make_params(planner, scenario.planner.params), scenario.seed),
         noise=Noise(
             range_sigma=noise.range_fraction,
             dropout=noise.dropout,

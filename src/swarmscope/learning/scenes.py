@@ -4,9 +4,9 @@
 area ahead. Task I: starts and goals anywhere, at least 7 m apart. Task II: a column somewhere between the left side and
 the middle, each robot up to ``RAGGED_M`` ahead or behind; goals on the right side, opposite.
 
-*driven*: DH-Bug, set as planner ``giwt`` is, drives the robots of tasks GIWT_1 (everybody moves) and GIWT_2; each of
-its key points counts. The document calls that too slow; here a run takes a fraction of a second, and the data is of
-what happens in use.
+*driven*: DH-Bug, but for its ``long_gaps`` set as planner ``giwt`` is, drives the robots of tasks GIWT_1 (everybody
+moves) and GIWT_2; each of its key points counts. The document calls that too slow; here a run takes a fraction of a
+second, and the data is of what happens in use.
 """
 
 from __future__ import annotations

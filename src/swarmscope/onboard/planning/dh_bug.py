@@ -98,13 +98,13 @@ class Params(NamedTuple):
     turn: int = 3
     """Side at a key point: 0 left, 1 right, 2 random, 3 the smaller turn."""
     seed: int = 0
-    """Of the random side, together with the robot's address and the number of its choices."""
+    """Of sides that are tossed for, together with the run's seed, the robot's address and the number of its choices."""
     told: int = 0
     """1: an oracle's side is taken where one is given."""
     sector: int = 0
     """1: a direction needs a free sector, not only room for the body."""
     long_gaps: int = 0
-    """1: room for the body is needed for ``safety.narrow_m`` (1.2 m) instead of l_th. Expert data was made so."""
+    """1: where no sector is asked for, room for the body is needed for ``safety.narrow_m`` (1.2 m) instead of l_th."""
     key_deg: float = 60.0
     """pi/2 - theta_1: with no safe direction this close to the goal's there is a key point."""
     face_deg: float = 10.0
