@@ -153,7 +153,7 @@ def set_up(threads: int, seed: int) -> None:
 
 
 def _keep_freed_memory() -> None:
-    """Let glibc use freed memory again; else a third of an epoch goes into fresh pages for each batch."""
+    """Let glibc use freed memory again, in all of this process; else a third of an epoch goes into fresh pages."""
     mmap_max, trim_threshold = -4, -1  # malloc.h
     with suppress(AttributeError, OSError, TypeError):
         libc = ctypes.CDLL(None)
