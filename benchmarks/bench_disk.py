@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from swarmscope.disk import bounds, maps, rules, runs
-from swarmscope.evaluation.disk_batches import Choice, play_all, play_batch, read_choice
+from swarmscope.disk.study.batches import Choice, play_all, play_batch, read_choice
 
 PEER = Path(__file__).parents[1] / "examples" / "disk" / "report_numpy.py"
 PEER_STEPS = 4000

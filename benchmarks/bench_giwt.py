@@ -16,12 +16,13 @@ import numpy as np
 
 from bench_step import prepared, step_us
 from swarmscope.errors import SwarmscopeError
-from swarmscope.evaluation.scenario import make_rig_of, parse_scenario
 from swarmscope.onboard.percept import DECISION, new_scratch
 from swarmscope.onboard.perception.local_map import CELLS, CHANNELS
 from swarmscope.onboard.planning import giwt
 from swarmscope.onboard.planning._giwt import Params, draw, empty_graph, gather, look, put_answer
 from swarmscope.onboard.planning._giwt_graph import FEATURES
+from swarmscope.scenarios.read import parse_scenario
+from swarmscope.scenarios.to_kernels import make_rig_of
 
 ROBOTS = 64
 REPEATS = 30

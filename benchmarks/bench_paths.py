@@ -9,7 +9,7 @@ import time
 
 import numpy as np
 
-from swarmscope.evaluation.shortest_path import any_angle_paths, grid_paths, lengths_m, pulled_path
+from swarmscope.judging.shortest_path import any_angle_paths, grid_paths, lengths_m, pulled_path
 from swarmscope.sim.world import compile_world
 from swarmscope.tasks import load_task
 

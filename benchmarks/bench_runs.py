@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 
 from swarmscope.errors import SwarmscopeError
-from swarmscope.evaluation.runner import find_references, play
-from swarmscope.evaluation.scenario import complete, make_setup, parse_scenario
-from swarmscope.evaluation.sides import make_advice
-from swarmscope.evaluation.work import make_job, unit_key, work, world_key
+from swarmscope.experiments.work import make_job, unit_key, work, world_key
+from swarmscope.judging.run import find_references, play
+from swarmscope.judging.sides import make_advice
 from swarmscope.onboard.planning._contract import load_planner, planner_names
+from swarmscope.scenarios.read import parse_scenario
+from swarmscope.scenarios.to_kernels import complete, make_setup
 
 MILLION = 1e6
 HOUR = 3600.0

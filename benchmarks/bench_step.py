@@ -10,12 +10,13 @@ import time
 
 import numpy as np
 
-from swarmscope.evaluation.scenario import make_rig_of, make_setup, parse_scenario
 from swarmscope.onboard.percept import DECISION, PERCEPT, new_scratch, new_shared
 from swarmscope.onboard.perception.filters import filter_padded, prepare_scan
 from swarmscope.onboard.planning import nav_scope
 from swarmscope.onboard.planning._contract import make_params
 from swarmscope.onboard.sharing.message import encode_features
+from swarmscope.scenarios.read import parse_scenario
+from swarmscope.scenarios.to_kernels import make_rig_of, make_setup
 from swarmscope.sim.lidar import cast_static, make_beams
 from swarmscope.sim.world import compile_world
 

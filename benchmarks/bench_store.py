@@ -15,11 +15,11 @@ from pathlib import Path
 import numpy as np
 from rich.progress import track
 
-from swarmscope.evaluation.campaign import keyed_units
-from swarmscope.evaluation.experiment import parse_experiment
-from swarmscope.evaluation.scenario import complete
-from swarmscope.evaluation.store import Store
-from swarmscope.evaluation.work import Finished, finished, make_job, work, world_key
+from swarmscope.experiments.campaign import keyed_units
+from swarmscope.experiments.experiment import parse_experiment
+from swarmscope.experiments.store import Store
+from swarmscope.experiments.work import Finished, finished, make_job, work, world_key
+from swarmscope.scenarios.to_kernels import complete
 
 VALUES = {
     "name": "bench",

@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 import time
 
-from swarmscope.evaluation.scenario import make_setting, make_setup, parse_scenario
+from swarmscope.scenarios.read import parse_scenario
+from swarmscope.scenarios.to_kernels import make_setting, make_setup
 from swarmscope.sim.loop import run
 
 NOISE = {

@@ -12,7 +12,8 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.patches import Circle, Wedge
 
-from swarmscope.evaluation.scenario import make_rig_of, make_setup, parse_scenario
+from swarmscope.scenarios.read import parse_scenario
+from swarmscope.scenarios.to_kernels import make_rig_of, make_setup
 from swarmscope.onboard.percept import Rig
 from swarmscope.onboard.perception.areas import passable_distance
 from swarmscope.onboard.perception.features import extrema, reconstruct

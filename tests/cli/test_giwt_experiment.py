@@ -9,7 +9,7 @@ import pytest
 import yaml
 from command_line import refused, swarmscope
 
-from swarmscope.evaluation.experiment import shipped_experiment
+from swarmscope.experiments.experiment import shipped_experiment
 
 ARMS = ["turn left", "turn right", "A* sides"]
 SMALL = {"robots": 4, "lidar": {"beams": 120}, "limit_s": 60.0}

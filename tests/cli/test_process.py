@@ -9,7 +9,7 @@ import pytest
 from command_line import SMALL, refused, swarmscope
 
 from swarmscope.errors import InputFileError
-from swarmscope.evaluation.run_folder import read_metrics
+from swarmscope.judging.run_folder import read_metrics
 
 HEAVY = ("numba", "numpy", "matplotlib", "yaml", "PIL", "swarmscope.onboard", "swarmscope.sim")
 
@@ -55,8 +55,8 @@ def test_a_reader_that_goes_away_leaves_no_traceback():
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-from swarmscope.evaluation.runner import run_scenario
-from swarmscope.evaluation.scenario import parse_scenario
+from swarmscope.judging.run import run_scenario
+from swarmscope.scenarios.read import parse_scenario
 def die(*_):
     os.kill(os.getpid(), signal.SIGKILL)
 scenario = parse_scenario({"task": {"name": "T1"}, "robots": 3, "limit_s": 12.0, "seed": 5}, "test")

@@ -10,8 +10,8 @@ import yaml
 from command_line import SMALL, refused, swarmscope
 
 from swarmscope.cli import run as run_module
-from swarmscope.evaluation.run_folder import RUN_FILES, read_config, read_metrics, read_world
-from swarmscope.evaluation.scenario import parse_scenario
+from swarmscope.judging.run_folder import RUN_FILES, read_config, read_metrics, read_world
+from swarmscope.scenarios.read import parse_scenario
 from swarmscope.sim.maps import save_map
 from swarmscope.sim.world import grid_from_solid
 

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import pytest
 
-from swarmscope.evaluation.scenario import SafetyModel
 from swarmscope.onboard.perception.areas import normalise, passable_distance, quadrant_area
 from swarmscope.onboard.planning import nav_scope
 from swarmscope.onboard.planning.fields import (
@@ -22,6 +21,7 @@ from swarmscope.onboard.planning.fields import (
     yields_to,
 )
 from swarmscope.onboard.robot import Body, protection_model
+from swarmscope.scenarios.scenario import SafetyModel
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from swarmscope.evaluation.sides import cost_to_go
+from swarmscope.judging.sides import cost_to_go
 from swarmscope.learning.labels import LABELLED, NOTHING_AHEAD, TIE, UNREACHABLE, build_wall, label
 from swarmscope.sim.world import Circle, Wall, WorldSpec, compile_world
 from swarmscope.tasks._occupancy import rasterise

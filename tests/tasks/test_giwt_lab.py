@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from swarmscope.errors import ConfigError, UnknownNameError
-from swarmscope.evaluation.shortest_path import grid_paths, lengths_m
+from swarmscope.judging.shortest_path import grid_paths, lengths_m
 from swarmscope.sim.world import Circle, Polygon
 from swarmscope.tasks import load_task
 from swarmscope.tasks.giwt_lab import EDGE_M, FREE_M

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from swarmscope.errors import ConfigError, UnsolvableWorldError
-from swarmscope.evaluation.shortest_path import grid_paths, lengths_m
+from swarmscope.judging.shortest_path import grid_paths, lengths_m
 from swarmscope.sim.contact import static_clearance
 from swarmscope.sim.world import Circle, Polygon, Wall, WorldSpec, compile_world
 from swarmscope.tasks import Setup, check_setup, load_task

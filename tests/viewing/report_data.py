@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from swarmscope.evaluation.cases import find_cases
-from swarmscope.evaluation.experiment import Experiment, Unit, parse_experiment, units
-from swarmscope.evaluation.metrics import path_lengths, path_redundancy, path_stretch, spl
-from swarmscope.evaluation.results import Run
-from swarmscope.evaluation.runner import figures, play
-from swarmscope.evaluation.scenario import complete
+from swarmscope.experiments.experiment import Experiment, Unit, parse_experiment, units
+from swarmscope.experiments.results import Run
+from swarmscope.judging.cases import find_cases
+from swarmscope.judging.metrics import path_lengths, path_redundancy, path_stretch, spl
+from swarmscope.judging.run import figures, play
+from swarmscope.scenarios.to_kernels import complete
 
 BASE: dict[str, Any] = {
     "name": "hand-made",

@@ -15,10 +15,10 @@ import pytest
 from report_data import SMALL, all_played, experiment, hand_made, played
 
 from swarmscope.errors import SwarmscopeError
-from swarmscope.evaluation.experiment import load_experiment, shipped_experiment, units
-from swarmscope.evaluation.results import pooled_figures
-from swarmscope.evaluation.statistics import Interval, PairedDifference, wilson
-from swarmscope.evaluation.weight import WeightResult
+from swarmscope.experiments.experiment import load_experiment, shipped_experiment, units
+from swarmscope.experiments.results import pooled_figures
+from swarmscope.experiments.weight import WeightResult
+from swarmscope.judging.statistics import Interval, PairedDifference, wilson
 from swarmscope.viewing.report import figures, markdown, publish, tables, words, write_report
 from swarmscope.viewing.report.again import Again
 from swarmscope.viewing.report.blocks import Row, Table

@@ -25,12 +25,12 @@ from swarmscope.disk.random_maps import RandomCase, random_map
 from swarmscope.disk.rules import Rules, all_permutations, read_permutation, scaled
 from swarmscope.disk.runs import Film, Problem, problem
 from swarmscope.disk.stalls import Situation, basins, describe
+from swarmscope.disk.study import table
+from swarmscope.disk.study.batches import Choice, Report, play_all, play_batch, read_choice
+from swarmscope.disk.study.figures import Played, Row, csv_text, ended_words, failures, played, row, rows_by_map
 from swarmscope.errors import ConfigError
-from swarmscope.evaluation.disk_batches import Choice, Report, play_all, play_batch, read_choice
-from swarmscope.evaluation.disk_figures import Played, Row, csv_text, ended_words, failures, played, row, rows_by_map
-from swarmscope.evaluation.provenance import git_revision, versions
-from swarmscope.evaluation.seeds import seed_set
-from swarmscope.viewing.disk import table
+from swarmscope.experiments.seeds import seed_set
+from swarmscope.judging.provenance import git_revision, versions
 from swarmscope.viewing.report.publish import put_in_place
 
 SHOWN_FAILURES = 8
@@ -46,7 +46,7 @@ def run_command(
     names: Sequence[str], map_: str, permutation: str | None, robots: int | None, radius: float | None, out: Path | None
 ) -> None:
     """Play one run with each controller, print how it went, write pictures and a replay page."""
-    from swarmscope.viewing.disk import pictures, replay
+    from swarmscope.disk.study import pictures, replay
 
     choices = read_choices(names)
     of = one_problem(map_, permutation, robots, radius)
@@ -140,7 +140,7 @@ def field_command(
     name: str, map_: str, permutation: str | None, robot: int, alone: bool, resolution: int | None, out: Path | None
 ) -> None:
     """Draw the field of one robot's velocities, and say where robots get stuck in it."""
-    from swarmscope.viewing.disk import pictures
+    from swarmscope.disk.study import pictures
 
     choice = read_choice(name)
     if choice.name == "planned":

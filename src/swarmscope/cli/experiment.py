@@ -14,17 +14,17 @@ from rich.table import Table
 
 from swarmscope.cli._console import PlainConsole
 from swarmscope.cli._errors import FAILED, INTERRUPTED
-from swarmscope.evaluation.campaign import Keyed, State, run_missing, state_of
-from swarmscope.evaluation.campaign import Progress as Report
-from swarmscope.evaluation.engines import make_engine
-from swarmscope.evaluation.experiment import (
+from swarmscope.experiments.campaign import Keyed, State, run_missing, state_of
+from swarmscope.experiments.campaign import Progress as Report
+from swarmscope.experiments.engines import make_engine
+from swarmscope.experiments.experiment import (
     Experiment,
     load_experiment,
     shipped_experiment,
     shipped_experiments,
 )
-from swarmscope.evaluation.store import Store
-from swarmscope.evaluation.weight import estimate_weight
+from swarmscope.experiments.store import Store
+from swarmscope.experiments.weight import estimate_weight
 
 MOST_ERRORS = 5
 

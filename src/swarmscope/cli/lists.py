@@ -10,8 +10,8 @@ from types import ModuleType
 from rich.table import Table
 
 from swarmscope.cli._console import PlainConsole
-from swarmscope.evaluation.scenario import task_options
 from swarmscope.onboard.planning._contract import load_planner, planner_names
+from swarmscope.scenarios.to_kernels import task_options
 from swarmscope.tasks import load_task, task_names
 from swarmscope.tasks._contract import Option
 

@@ -9,7 +9,7 @@ from rich.table import Table
 
 from swarmscope.cli._console import PlainConsole
 from swarmscope.errors import UnknownNameError
-from swarmscope.evaluation.perceive import Perception, perceive, write_features
+from swarmscope.experiments.perceive import Perception, perceive, write_features
 from swarmscope.sim.scan_files import ScanLog, load_scans
 
 SCAN_FOLDER = Path(__file__).parent.parent / "data" / "scans"

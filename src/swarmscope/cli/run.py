@@ -16,10 +16,11 @@ from rich.table import Table
 
 from swarmscope.cli._console import PlainConsole
 from swarmscope.errors import ConfigError
-from swarmscope.evaluation.run_folder import check_out
-from swarmscope.evaluation.runner import place_name, run_scenario
-from swarmscope.evaluation.scenario import Scenario, parse_scenario, read_scenario_file
-from swarmscope.evaluation.warm_up import kernels_are_cold
+from swarmscope.experiments.warm_up import kernels_are_cold
+from swarmscope.judging.run import place_name, run_scenario
+from swarmscope.judging.run_folder import check_out
+from swarmscope.scenarios.read import parse_scenario, read_scenario_file
+from swarmscope.scenarios.scenario import Scenario
 
 PLACES = ("task", "map", "place")
 MOST_FAILURES = 10

@@ -18,8 +18,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from swarmscope.errors import ConfigError, SwarmscopeError
-from swarmscope.evaluation.engines.local import start_worker
-from swarmscope.evaluation.provenance import git_revision, versions
+from swarmscope.experiments.engines.local import start_worker
+from swarmscope.judging.provenance import git_revision, versions
 from swarmscope.learning.records import (
     FORMAT,
     MANIFEST,

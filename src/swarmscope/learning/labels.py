@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarmscope._jit import jit, jit_alloc
-from swarmscope.evaluation.sides import cost_to_go
+from swarmscope.judging.sides import cost_to_go
 from swarmscope.sim.advice import blocked_stretch, side_of_way, start_cell
 from swarmscope.tasks._occupancy import Raster, free_cells_near
 

@@ -20,14 +20,16 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swarmscope.evaluation.scenario import Scenario, make_rig_of, make_setting, parse_scenario
-from swarmscope.evaluation.sides import judged_by
+from swarmscope.judging.sides import judged_by
 from swarmscope.learning.labels import LABELLED, OUTCOMES, Label, label
 from swarmscope.learning.views import look
 from swarmscope.onboard.percept import Rig
 from swarmscope.onboard.perception.local_map import encode_scan, hide_robot
 from swarmscope.onboard.planning import dh_bug
 from swarmscope.onboard.planning._giwt_graph import GRID_M
+from swarmscope.scenarios.read import parse_scenario
+from swarmscope.scenarios.scenario import Scenario
+from swarmscope.scenarios.to_kernels import make_rig_of, make_setting
 from swarmscope.sim.lidar import Beams, make_beams
 from swarmscope.sim.loop import run
 from swarmscope.sim.world import World, compile_world

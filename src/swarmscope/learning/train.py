@@ -22,7 +22,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from swarmscope.errors import ConfigError, InputFileError, SwarmscopeError
-from swarmscope.evaluation.provenance import git_revision, versions
+from swarmscope.judging.provenance import git_revision, versions
 from swarmscope.learning import checkpoints
 from swarmscope.learning.batches import Batch, View, batches
 from swarmscope.learning.config import TrainingConfig

@@ -10,7 +10,7 @@ import numpy as np
 from swarmscope.errors import InputFileError
 
 if TYPE_CHECKING:
-    from swarmscope.evaluation.perceive import Perception
+    from swarmscope.experiments.perceive import Perception
 
 PANELS = 6
 SCAN, SAFE, FILTERED, FEATURE = "#444444", "#2a9d57", "#3a6ea5", "#d1495b"

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from swarmscope.errors import InputFileError
-from swarmscope.evaluation.run_folder import TRAJECTORY, WORLD, read_metrics, read_trajectory, read_world
+from swarmscope.judging.run_folder import TRAJECTORY, WORLD, read_metrics, read_trajectory, read_world
 from swarmscope.sim.world import Length, Number, Obstacle, Point
 
 Array = npt.NDArray[Any]

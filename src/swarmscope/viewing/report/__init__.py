@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from swarmscope.evaluation.experiment import Experiment
-from swarmscope.evaluation.results import Run
-from swarmscope.evaluation.weight import WeightResult
+from swarmscope.experiments.experiment import Experiment
+from swarmscope.experiments.results import Run
+from swarmscope.experiments.weight import WeightResult
 from swarmscope.viewing.report.blocks import pictures_of
 from swarmscope.viewing.report.document import make_document
 from swarmscope.viewing.report.drawing import style

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swarmscope.evaluation.results import Run
-from swarmscope.evaluation.runner import play
-from swarmscope.evaluation.scenario import parse_scenario
+from swarmscope.experiments.results import Run
+from swarmscope.judging.run import play
+from swarmscope.scenarios.read import parse_scenario
 from swarmscope.sim.world import WorldSpec
 
 Floats = NDArray[np.float64]

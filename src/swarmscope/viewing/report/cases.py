@@ -7,9 +7,9 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from swarmscope.errors import SwarmscopeError
-from swarmscope.evaluation.results import Run
-from swarmscope.evaluation.scenario import parse_scenario
+from swarmscope.experiments.results import Run
 from swarmscope.onboard.robot import Body, protection_model
+from swarmscope.scenarios.read import parse_scenario
 from swarmscope.viewing.pictures import FAINT, INK
 from swarmscope.viewing.report import words
 from swarmscope.viewing.report.again import Again, Played

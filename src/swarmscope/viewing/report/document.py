@@ -8,8 +8,8 @@ import numpy as np
 import yaml
 
 from swarmscope.errors import SwarmscopeError
-from swarmscope.evaluation.experiment import Experiment, shipped_experiments
-from swarmscope.evaluation.provenance import git_revision, versions
+from swarmscope.experiments.experiment import Experiment, shipped_experiments
+from swarmscope.judging.provenance import git_revision, versions
 from swarmscope.viewing.report import figures, tables, words
 from swarmscope.viewing.report.again import Again
 from swarmscope.viewing.report.blocks import (

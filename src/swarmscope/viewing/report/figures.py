@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from swarmscope.errors import SwarmscopeError
-from swarmscope.evaluation.experiment import Sweep, merged, sweep_label
-from swarmscope.evaluation.results import Run, flow_time_increases
-from swarmscope.evaluation.scenario import RobotModel
+from swarmscope.experiments.experiment import Sweep, merged, sweep_label
+from swarmscope.experiments.results import Run, flow_time_increases
 from swarmscope.onboard.planning._contract import load_planner
 from swarmscope.onboard.planning.fields import interaction_force
 from swarmscope.onboard.robot import Body, protection_model
+from swarmscope.scenarios.scenario import RobotModel
 from swarmscope.viewing.pictures import FAINT, INK
 from swarmscope.viewing.report import words
 from swarmscope.viewing.report.blocks import Picture

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from swarmscope.evaluation.experiment import Experiment, merged
-from swarmscope.evaluation.metrics import BETWEEN
-from swarmscope.evaluation.results import PathGap, Run, grouped, paired, path_gap, pooled_figures, values_of
-from swarmscope.evaluation.statistics import (
+from swarmscope.experiments.experiment import Experiment, merged
+from swarmscope.experiments.results import PathGap, Run, grouped, paired, path_gap, pooled_figures, values_of
+from swarmscope.experiments.weight import WeightResult
+from swarmscope.judging.metrics import BETWEEN
+from swarmscope.judging.statistics import (
     RESAMPLES,
     Interval,
     PairedDifference,
@@ -19,7 +20,6 @@ from swarmscope.evaluation.statistics import (
     bootstrap_ratio,
     wilson,
 )
-from swarmscope.evaluation.weight import WeightResult
 
 Floats = NDArray[np.float64]
 

@@ -6,8 +6,8 @@ import math
 from itertools import pairwise
 from typing import NamedTuple
 
-from swarmscope.evaluation.metrics import metric_named
-from swarmscope.evaluation.statistics import PairedDifference
+from swarmscope.judging.metrics import metric_named
+from swarmscope.judging.statistics import PairedDifference
 from swarmscope.viewing.report import words
 from swarmscope.viewing.report.blocks import Block, Line, Mark, Points, Row, Table, Text, cell
 from swarmscope.viewing.report.material import ALL, Material

@@ -6,9 +6,9 @@ import math
 from typing import NamedTuple
 
 from swarmscope.errors import UnknownNameError
-from swarmscope.evaluation.results import Run, TimeBudget, time_budget
-from swarmscope.evaluation.statistics import PairedDifference
-from swarmscope.evaluation.weight import NEIGHBOUR_PRINTED, SELF_PRINTED, WEIGHT_PRINTED, WeightResult
+from swarmscope.experiments.results import Run, TimeBudget, time_budget
+from swarmscope.experiments.weight import NEIGHBOUR_PRINTED, SELF_PRINTED, WEIGHT_PRINTED, WeightResult
+from swarmscope.judging.statistics import PairedDifference
 from swarmscope.onboard.planning._contract import load_planner
 from swarmscope.viewing.report import words
 from swarmscope.viewing.report.blocks import Line, Mark, Row, Table, Value, cell

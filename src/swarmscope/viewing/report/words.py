@@ -6,8 +6,8 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-from swarmscope.evaluation.metrics import metric_named
-from swarmscope.evaluation.statistics import Interval, PairedDifference
+from swarmscope.judging.metrics import metric_named
+from swarmscope.judging.statistics import Interval, PairedDifference
 from swarmscope.viewing.report.blocks import Mark
 
 MISSING = "–"

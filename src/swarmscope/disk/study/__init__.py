@@ -1,0 +1,1 @@
+"""Runs of the unit disk in bulk, their figures, tables, pictures and replay pages."""

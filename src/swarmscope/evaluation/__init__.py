@@ -1,1 +1,0 @@
-"""Reference paths, metrics, statistics and run folders."""

@@ -1,0 +1,285 @@
+"""From a scenario to its figures and its run folder."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from swarmscope.judging.metrics import (
+    all_metrics,
+    mover_arrival_rate,
+    mover_path_m,
+    movers,
+    path_lengths,
+    path_stretch,
+    side_accuracy,
+    sides_judged,
+)
+from swarmscope.judging.provenance import git_revision, versions
+from swarmscope.judging.run_folder import check_out, write_run
+from swarmscope.judging.shortest_path import any_angle_paths, grid_paths, lengths_m
+from swarmscope.judging.sides import judged_by, make_advice
+from swarmscope.onboard.planning._contract import REASON_NAMES, STATE_NAMES
+from swarmscope.scenarios.scenario import Scenario
+from swarmscope.scenarios.to_kernels import complete, make_setting, make_setup
+from swarmscope.sim.loop import Setting, Trace, run
+from swarmscope.tasks import Setup
+
+ANY_ANGLE_ROBOTS = 50
+"""With more robots the any-angle reference, which takes longer than the run, is left out."""
+ARRIVE_M = 0.05
+"""Distance to the goal at which robots have arrived whose planner has no parameter ``arrive_m``."""
+KILO = 1000.0
+SEARCHED_M2 = 1e6
+"""Sum of (start to goal)^2 over the robots that get an A* reference: some 5 s of search."""
+
+
+class References(NamedTuple):
+    """The shortest ways of a world's robots, which do not depend on who plans."""
+
+    shortest_m: np.ndarray
+    """(N,) A* lengths, NaN without."""
+    any_angle_m: np.ndarray
+    """(N,) true shortest lengths, NaN without."""
+    wall_s: float
+    """How long they took to find (measured)."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A finished run with its references."""
+
+    scenario: Scenario
+    setup: Setup
+    setting: Setting
+    trace: Trace
+    references: References
+
+
+def play(
+    scenario: Scenario,
+    threads: int = 1,
+    progress: Callable[[float, int], None] | None = None,
+    any_angle: bool = True,
+    references: References | None = None,
+) -> Outcome:
+    """Run the scenario and find the reference ways; ``progress(simulated seconds, robots done)``.
+
+    ``references`` of the same world are taken as they are. The side of the shortest way is found for planners that
+    declare ``TOLD_SIDE``, and where the scenario says ``judge_sides``: then it is noted beside every choice.
+    """
+    setup = make_setup(scenario)
+    setting = make_setting(scenario, setup, threads)
+    if scenario.judge_sides or getattr(setting.planner, "TOLD_SIDE", False):
+        setting = replace(setting, advice=make_advice(setup, *judged_by(scenario, setting.rig)))
+    trace = run(setting, progress)
+    if references is None:
+        references = find_references(scenario, setup, any_angle)
+    return Outcome(scenario, setup, setting, trace, references)
+
+
+def find_references(scenario: Scenario, setup: Setup, any_angle: bool = True) -> References:
+    """Find the shortest ways of the scenario's robots."""
+    radius = scenario.robot.radius_m
+    begun = time.perf_counter()
+    chosen = _with_reference(setup)
+    ways = grid_paths(setup.world, setup.starts[chosen], setup.goals[chosen], radius)
+    wall_s = time.perf_counter() - begun
+    shortest, best = np.full((2, scenario.robots), np.nan)
+    shortest[chosen] = lengths_m(ways)
+    if any_angle and len(chosen) == scenario.robots <= ANY_ANGLE_ROBOTS:
+        best = lengths_m(any_angle_paths(setup.world, setup.starts, setup.goals, radius, ways))
+    return References(shortest, best, wall_s)
+
+
+def _with_reference(setup: Setup) -> np.ndarray:
+    """Return the robots that get a reference way: all, or of a large swarm evenly chosen ones."""
+    robots = len(setup.starts)
+    apart = setup.goals - setup.starts[:, :2]
+    share = min(1.0, SEARCHED_M2 / max(1.0, float((apart * apart).sum())))
+    return np.unique(np.linspace(0, robots - 1, max(1, int(share * robots))).astype(int))
+
+
+def run_scenario(
+    scenario: Scenario,
+    out: Path,
+    threads: int = 1,
+    progress: Callable[[float, int], None] | None = None,
+    extras: Callable[[Path], None] | None = None,
+) -> dict[str, Any]:
+    """Run the scenario into the run folder ``out`` and return its metrics; ``extras`` adds pictures to it."""
+    check_out(out)
+    outcome = play(scenario, threads, progress)
+    metrics = figures(outcome)
+    write_run(out, complete(scenario), world_table(outcome), trajectory(outcome), metrics, extras)
+    return metrics
+
+
+def figures(outcome: Outcome) -> dict[str, Any]:
+    """Return everything that goes into ``metrics.json``; only ``plan_us_*`` and ``measured`` are times."""
+    robots, trace, scenario = outcome.trace.robots, outcome.trace, outcome.scenario
+    t_s, x, y = _with_end(outcome)
+    records = trace.records
+    values: dict[str, Any] = dict(
+        all_metrics(
+            t_s,
+            x,
+            y,
+            _pad(records.speed),
+            _pad(records.bytes_sent),
+            robots["arrival_s"],
+            robots["crashed"],
+            outcome.references.shortest_m,
+        )
+    )
+    travelled = path_lengths(x, y, t_s, robots["arrival_s"])
+    stretch = path_stretch(travelled, outcome.references.any_angle_m, robots["arrival_s"])
+    arrive_m = float(getattr(outcome.setting.params, "arrive_m", ARRIVE_M))
+    moved = movers(outcome.setup.starts, outcome.setup.goals, arrive_m)
+    sides, told = trace.choices["side"], trace.choices["told_side"]
+    simulated = len(trace.t_s) * outcome.setting.dt
+    features = int(robots["sent_features"].sum())
+    values |= {
+        "path_stretch_any_angle": stretch,
+        "mover_path_m": mover_path_m(travelled, robots["arrival_s"], moved),
+        "mover_arrival_rate": mover_arrival_rate(robots["arrival_s"], moved),
+        "movers": int(moved.sum()),
+        "side_accuracy": side_accuracy(sides, told) if told.any() else None,
+        "sides_judged": sides_judged(told),
+        "reference_robots": int(np.isfinite(outcome.references.shortest_m).sum()),
+        "planning_failures": int((~np.isfinite(robots["arrival_s"])).sum()),
+        "collisions": int(robots["crashed"].sum()),
+        "min_clearance_m": float(robots["min_clearance"].min()),
+        "fusions": int(robots["fusions"].sum()),
+        "messages": int(robots["sent"].sum()),
+        "requests": int(robots["sent"].sum()) - features,
+        "bytes_sent": int(robots["bytes"].sum()),
+        "bytes_on_air": int(robots["air_bytes"].sum()),
+        "mean_package_bytes": float(robots["feature_bytes"].sum() / features) if features else None,
+        "bandwidth_kbps": float(8.0 * robots["bytes"].sum() / simulated / KILO),
+        "packets_lost": int(robots["lost"].sum()),
+        "packets_out_of_range": int(robots["unreachable"].sum()),
+        "packets_crowded_out": int(robots["crowded"].sum()),
+        "packets_dropped_bad": int(trace.shared["dropped_bad"].sum()),
+        "packets_dropped_stale": int(trace.shared["dropped_stale"].sum()),
+        "planner_memory_bytes": trace.memory_bytes,
+        "simulated_s": simulated,
+        "failures": failures(outcome),
+        "run": {
+            "task": place_name(scenario),
+            "planner": scenario.planner.name,
+            "robots": scenario.robots,
+            "seed": scenario.seed,
+        },
+        **_model(outcome.setting.planner),
+        "config_sha256": hashlib.sha256(json.dumps(complete(scenario), sort_keys=True).encode()).hexdigest(),
+        "versions": versions(),
+        "git_revision": git_revision(),
+        "plan_us_p50": _percentile(trace.plan_us, 50),
+        "plan_us_p99": _percentile(trace.plan_us, 99),
+        "measured": {
+            "run_wall_s": trace.wall_s,
+            "reference_s": outcome.references.wall_s,
+            "real_time_factor": max(0.0, simulated - outcome.setting.dt) / trace.wall_s,
+        },
+    }
+    return values
+
+
+def _model(planner: Any) -> dict[str, str]:
+    """Return which network the planner runs, nothing without one."""
+    state = getattr(planner, "model_state", None)
+    return {} if state is None else {"model_sha256": state()}
+
+
+def place_name(scenario: Scenario) -> str:
+    """Return what the scenario is run in, for titles."""
+    if scenario.task is not None:
+        return scenario.task.name
+    return Path(scenario.map.file).stem if scenario.map is not None else "place"
+
+
+def failures(outcome: Outcome) -> list[dict[str, Any]]:
+    """Name each robot that did not arrive, and why."""
+    robots, records = outcome.trace.robots, outcome.trace.records
+    found = []
+    for i in np.flatnonzero(~np.isfinite(robots["arrival_s"])):
+        state, reason = STATE_NAMES[records.state[-1, i]], REASON_NAMES[records.reason[-1, i]]
+        to_go = float(np.hypot(robots["goal_x"][i] - robots["x"][i], robots["goal_y"][i] - robots["y"][i]))
+        late = f"time limit in state '{state}': {reason}; {to_go:.1f} m from its goal"
+        why = "collided" if robots["crashed"][i] else late
+        found.append({"robot": int(i), "why": why})
+    return found
+
+
+def world_table(outcome: Outcome) -> dict[str, Any]:
+    """Return ``world.json``: robots, starts, goals and every obstacle."""
+    spec = outcome.setup.world.model_dump(mode="json")
+    radius = outcome.scenario.robot.radius_m
+    robots = [
+        {"id": i, "radius": radius, "start": start.tolist(), "goal": goal.tolist()}
+        for i, (start, goal) in enumerate(zip(outcome.setup.starts, outcome.setup.goals, strict=True))
+    ]
+    return {"frame": "map, x east, y north, m and rad (REP-103)", "robots": robots, **spec}
+
+
+def trajectory(outcome: Outcome) -> dict[str, np.ndarray]:
+    """Return the arrays of ``trajectory.npz`` (docs/architecture.md)."""
+    trace, rig = outcome.trace, outcome.setting.rig
+    records = trace.records
+    angles = rig.sensor.angle_min + rig.sensor.increment * np.arange(rig.sensor.beams)
+    return {
+        "t_s": trace.t_s,
+        "x_m": records.x,
+        "y_m": records.y,
+        "yaw_rad": records.yaw,
+        "state": records.state,
+        "reason": records.reason,
+        "speed_mps": records.speed,
+        "clearance_m": records.clearance,
+        "p_left": records.p_left,
+        "side": records.side,
+        "bytes_sent": records.bytes_sent,
+        "neighbours": records.neighbours,
+        "state_names": np.array(STATE_NAMES),
+        "reason_names": np.array(REASON_NAMES),
+        "beam_angles": angles,
+        "scan_u8": records.scan,
+        "safe_bits": records.safe,
+        "links": trace.links,
+        "arrival_s": trace.robots["arrival_s"].copy(),
+        "collided": trace.robots["crashed"].copy(),
+        "range_max_m": np.array(rig.sensor.range_max),
+    }
+
+
+def _with_end(outcome: Outcome) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return times and positions, with those at the end of the run (the goal of who arrived) added."""
+    trace, robots = outcome.trace, outcome.trace.robots
+    arrived = np.isfinite(robots["arrival_s"])
+    end_x = np.where(arrived, outcome.setup.goals[:, 0], robots["x"])
+    end_y = np.where(arrived, outcome.setup.goals[:, 1], robots["y"])
+    x, y = trace.records.x.copy(), trace.records.y.copy()
+    for i in np.flatnonzero(arrived):  # the way left to the goal counts as travelled
+        after = trace.t_s >= robots["arrival_s"][i] - 1e-9
+        x[after, i], y[after, i] = end_x[i], end_y[i]
+    t_s = np.append(trace.t_s, len(trace.t_s) * outcome.setting.dt)
+    return t_s, np.vstack([x, end_x]), np.vstack([y, end_y])
+
+
+def _pad(values: np.ndarray) -> np.ndarray:
+    """Repeat the last row once."""
+    padded: np.ndarray = np.vstack([values, values[-1:]])
+    return padded
+
+
+def _percentile(values: np.ndarray, q: float) -> float | None:
+    """Return a percentile, None without values."""
+    return float(np.percentile(values, q)) if len(values) else None

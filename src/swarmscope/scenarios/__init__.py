@@ -1,0 +1,1 @@
+"""Scenarios: one file that describes one run completely, and the run made from it."""

@@ -1,0 +1,104 @@
+"""From a file or a mapping to a checked scenario; whatever is wrong names place, problem and the nearest valid key."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import yaml
+from pydantic import ValidationError
+
+from swarmscope.errors import ConfigError, InputFileError, UnknownNameError, nearest_hint
+from swarmscope.onboard.planning._contract import load_planner, planner_names
+from swarmscope.scenarios.scenario import Scenario
+from swarmscope.sim.maps import packaged_map
+from swarmscope.tasks._contract import task_names
+
+
+def parse_scenario(values: Any, where: str) -> Scenario:
+    """Return the scenario in ``values``; a ConfigError names place, problem and the nearest valid key."""
+    if not isinstance(values, dict):
+        raise ConfigError(where, "a scenario is a mapping of keys to values")
+    try:
+        scenario = Scenario.model_validate(values)
+    except ValidationError as error:
+        raise _first_problem(error, where) from None
+    if scenario.task is not None and scenario.task.name not in task_names():
+        raise UnknownNameError("task", scenario.task.name, task_names(), f"{where}: task.name")
+    if scenario.planner.name not in planner_names():
+        raise UnknownNameError("planner", scenario.planner.name, planner_names(), f"{where}: planner.name")
+    if scenario.planner.model is not None and not hasattr(load_planner(scenario.planner.name), "with_model"):
+        raise ConfigError(f"{where}: planner.model", f"planner '{scenario.planner.name}' runs no network")
+    return scenario
+
+
+def read_scenario_file(path: Path) -> dict[str, Any]:
+    """Return the mapping in YAML file ``path``, not validated yet; a map file and a model are looked for beside it."""
+    try:
+        values = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except UnicodeDecodeError:
+        raise InputFileError(path, "is not text") from None
+    except OSError as error:
+        raise InputFileError(path, f"cannot be read ({error.strerror})") from None
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        raise InputFileError(path, f"is not YAML ({' '.join(str(error).split())})") from None
+    if not isinstance(values, dict):
+        raise ConfigError(str(path), "a scenario is a mapping of keys to values")
+    place = values.get("map")
+    if isinstance(place, dict) and isinstance(place.get("file"), str):
+        place["file"] = _find_map(path, place["file"])
+    planner = values.get("planner")
+    if isinstance(planner, dict) and isinstance(planner.get("model"), str):
+        planner["model"] = _find_beside(path, planner["model"])
+    return values
+
+
+def _find_map(scenario: Path, name: str) -> str:
+    """Return the map's path: beside the scenario or as it is; names of packaged maps stay names."""
+    if is_packaged(name):
+        return name
+    return _find_beside(scenario, name)
+
+
+def _find_beside(scenario: Path, name: str) -> str:
+    """Return the path beside the scenario if there is something, else as it is."""
+    beside = scenario.parent / name
+    return str(beside) if beside.exists() else name
+
+
+def load_scenario(path: Path) -> Scenario:
+    """Return the scenario in YAML file ``path``."""
+    return parse_scenario(read_scenario_file(path), str(path))
+
+
+def _first_problem(error: ValidationError, where: str) -> ConfigError:
+    """Turn pydantic's first error into ours."""
+    problem = error.errors()[0]
+    place = ".".join(str(p) for p in problem["loc"]) or "(top)"
+    message = str(problem["msg"]).removeprefix("Value error, ")
+    if problem["type"] == "extra_forbidden":
+        message = f"unknown key{nearest_hint(str(problem['loc'][-1]), _valid_keys(problem['loc'][:-1]))}"
+    return ConfigError(f"{where}: {place}", message)
+
+
+def _valid_keys(loc: tuple[int | str, ...]) -> list[str]:
+    """Return the keys that are valid at place ``loc`` of a scenario."""
+    model: Any = Scenario
+    for part in loc:
+        fields = getattr(model, "model_fields", {})
+        if part not in fields:
+            return []
+        kind = fields[part].annotation
+        options = [k for k in getattr(kind, "__args__", ()) if hasattr(k, "model_fields")]
+        model = options[0] if options else kind
+    return list(getattr(model, "model_fields", {}))
+
+
+def map_path(name: str) -> Path:
+    """Return the YAML file of a map: a path, or the name of a map that comes with the package."""
+    return packaged_map(name) if is_packaged(name) else Path(name)
+
+
+def is_packaged(name: str) -> bool:
+    """Tell whether this is the name of a map that comes with the package, not a path."""
+    return not name.endswith((".yaml", ".yml"))

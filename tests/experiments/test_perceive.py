@@ -1,0 +1,168 @@
+"""Recorded scans through the on-board perception."""
+
+from __future__ import annotations
+
+import csv
+import math
+
+import numpy as np
+import pytest
+
+from helpers import circles_world, rig_of, scan_at
+from swarmscope.cli.perceive import SCAN_FOLDER
+from swarmscope.errors import ConfigError, InputFileError
+from swarmscope.experiments.perceive import perceive, write_features
+from swarmscope.onboard.percept import PERCEPT, new_scratch
+from swarmscope.onboard.perception.safety import safe_directions
+from swarmscope.onboard.tick import features
+from swarmscope.sim.scan_files import ScanLog, load_scans
+from swarmscope.viewing.perceive_picture import PANELS, write_perceive_picture
+
+
+def log_of(ranges, fov=2.0 * math.pi, range_max=30.0, range_min=0.0):
+    """A log of scans (K, M); a full circle unless told otherwise."""
+    ranges = np.atleast_2d(np.asarray(ranges, np.float32))
+    beams = ranges.shape[1]
+    full = fov == 2.0 * math.pi
+    increment = fov / (beams if full else beams - 1)
+    stamps = np.arange(len(ranges), dtype=float)
+    return ScanLog("test", ranges, stamps, -0.5 * fov, increment, range_min, range_max, None)
+
+
+@pytest.fixture(scope="module")
+def real():
+    return load_scans(SCAN_FOLDER / "malaga_telecom_2006_sick_lms.npz")
+
+
+@pytest.fixture(scope="module")
+def forest_scans():
+    trees = [(1.5, 0.4, 0.3), (-2.0, 1.0, 0.4), (0.3, -1.8, 0.25), (3.0, -2.0, 0.5)]
+    world = circles_world(trees)
+    return np.stack([scan_at(world, rig_of(), 0.0, 0.0, yaw) for yaw in (0.0, 1.0, 2.5)])
+
+
+def test_every_real_scan_is_perceived(real):
+    seen = perceive(real)
+    scans, beams = real.ranges_m.shape
+    assert seen.safe.shape == seen.filtered_m.shape == (scans, beams)
+    assert len(seen.features) == len(seen.packet_bytes) == len(seen.us) == scans
+    assert 0.2 < seen.safe.mean() < 0.95
+    assert np.array_equal(seen.packet_bytes, [10 + 2 * len(pairs) for pairs in seen.features])
+    assert seen.packet_bytes.mean() <= 32.0
+    assert np.all(seen.us > 0.0)
+    assert not seen.rig.sensor.wraps and seen.rig.sensor.range_max == 5.0
+
+
+def test_safe_directions_of_real_scans_lead_the_body_past_all_returns(real):
+    seen = perceive(real)
+    cos, sin = np.cos(seen.angles), np.sin(seen.angles)
+    for k in range(0, len(seen.safe), 7):
+        r = np.where(np.isfinite(seen.ranges_m[k]), seen.ranges_m[k], 1e6)
+        x, y = r * cos, r * sin
+        near = r < seen.rig.protection.l_th
+        for n in np.flatnonzero(seen.safe[k]):
+            ahead, across = x * cos[n] + y * sin[n], np.abs(y * cos[n] - x * sin[n])
+            assert not np.any(near & (ahead > 0.0) & (across < seen.rig.body.radius)), (k, n)
+
+
+def test_it_is_what_the_robots_kernels_say(forest_scans):
+    seen = perceive(log_of(forest_scans))
+    rig = seen.rig
+    assert rig.sensor.wraps
+    scratch, percept = new_scratch(1, rig), np.zeros(1, PERCEPT)
+    for k, scan in enumerate(forest_scans):
+        sensor = rig.sensor
+        safe_directions(
+            scan, sensor.range_min, sensor.range_max, sensor.wraps, rig.reach[0], scratch.edges[0], scratch.safe[0]
+        )
+        rows = (scratch.padded[0], scratch.angles[0], scratch.distances[0], scratch.filtered[0])
+        count = features(scan, percept[0], scratch.edges[0], scratch.narrow[0], *rows, rig)
+        assert np.array_equal(seen.safe[k], scratch.safe[0] == 1)
+        assert len(seen.features[k]) == count > 0
+        assert np.allclose(seen.features[k][:, 1], scratch.distances[0, 0, :count])
+
+
+def test_turning_the_sensor_turns_the_features(forest_scans):
+    scan = forest_scans[0]
+    straight, turned = perceive(log_of(scan)), perceive(log_of(np.roll(scan, 90)))
+    a, b = straight.features[0], turned.features[0]
+    assert sorted(np.round(a[:, 1], 4)) == sorted(np.round(b[:, 1], 4))
+    moved = np.sort(np.mod(a[:, 0] + 0.5 * math.pi, 2.0 * math.pi))
+    assert np.allclose(moved, np.sort(np.mod(b[:, 0], 2.0 * math.pi)), atol=1e-5)
+
+
+def test_returns_beyond_the_robots_range_count_as_none():
+    far = np.full(360, 7.0, np.float32)
+    seen = perceive(log_of(far), range_m=5.0)
+    assert np.isinf(seen.ranges_m).all() and seen.safe.all() and len(seen.features[0]) == 0
+
+
+def test_a_scan_that_is_invalid_throughout_leaves_no_direction():
+    scans = np.full((2, 360), np.nan, np.float32)
+    scans[1] = np.inf
+    seen = perceive(log_of(scans))
+    assert not seen.safe[0].any() and seen.safe[1].all()
+
+
+def test_the_log_itself_is_not_changed(forest_scans):
+    log = log_of(forest_scans)
+    before = log.ranges_m.copy()
+    perceive(log, range_m=2.0, beam_step=2)
+    assert np.array_equal(log.ranges_m, before)
+
+
+def test_beam_step_takes_every_kth_beam(forest_scans):
+    log = log_of(forest_scans)
+    seen = perceive(log, beam_step=3)
+    assert seen.safe.shape == (3, 120) and seen.rig.sensor.wraps
+    assert np.allclose(np.diff(seen.angles), 3.0 * log.increment)
+    assert np.array_equal(seen.ranges_m[0][np.isfinite(seen.ranges_m[0])], _finite(log.ranges_m[0, ::3]))
+
+
+def _finite(values):
+    return values[np.isfinite(values)]
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"range_m": 0.0}, "--range"),
+        ({"range_m": math.nan}, "--range"),
+        ({"range_m": math.inf}, "--range"),
+        ({"radius_m": 0.0}, "radius"),
+        ({"radius_m": math.nan}, "radius"),
+        ({"beam_step": 0}, "--beam-step"),
+        ({"beam_step": 500}, "two beams"),
+    ],
+)
+def test_impossible_options_are_refused(options, words, forest_scans):
+    with pytest.raises(ConfigError, match=words):
+        perceive(log_of(forest_scans), **options)
+
+
+def test_a_range_below_the_scanners_smallest_is_refused(forest_scans):
+    with pytest.raises(ConfigError, match="smallest range"):
+        perceive(log_of(forest_scans, range_min=0.5), range_m=0.4)
+
+
+def test_features_table_holds_every_feature(forest_scans, tmp_path):
+    seen = perceive(log_of(forest_scans))
+    path = write_features(tmp_path / "new" / "features.csv", seen)
+    rows = list(csv.DictReader(path.open()))
+    assert len(rows) == sum(map(len, seen.features))
+    k, direction, distance = (float(value) for value in rows[-1].values())
+    assert [direction, distance] == pytest.approx(seen.features[int(k)][-1], abs=1e-4)
+
+
+@pytest.mark.parametrize("scans", [1, 3, 20])
+def test_picture_shows_up_to_six_scans_and_is_the_same_twice(scans, forest_scans, tmp_path):
+    seen = perceive(log_of(np.resize(forest_scans, (scans, 360))))
+    pictures = [write_perceive_picture(tmp_path / f"{k}.png", seen, "t").read_bytes() for k in range(2)]
+    assert pictures[0] == pictures[1] and pictures[0].startswith(b"\x89PNG")
+    assert PANELS == 6
+
+
+def test_picture_says_when_it_cannot_be_written(forest_scans, tmp_path):
+    (tmp_path / "file").touch()
+    with pytest.raises(InputFileError, match="cannot be written"):
+        write_perceive_picture(tmp_path / "file" / "p.png", perceive(log_of(forest_scans)), "t")
