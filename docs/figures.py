@@ -26,7 +26,7 @@ from swarmscope.onboard.perception.filters import (
 )
 from swarmscope.onboard.perception.safety import safe_directions
 from swarmscope.onboard.planning.fields import interaction_force
-from swarmscope.onboard.robot import Body, protection_model
+from swarmscope.onboard.body import Body, protection_model
 from swarmscope.sim.lidar import cast_static, make_beams
 from swarmscope.sim.world import compile_world
 
@@ -109,14 +109,14 @@ def protection() -> plt.Figure:
     axes.add_patch(Wedge((0, 0), p.l_th, half, 90, color=BLUE, alpha=0.08, lw=0))
     axes.add_patch(Wedge((0, 0), p.l_th, -90, -half, color=ORANGE, alpha=0.08, lw=0))
     axes.add_patch(Circle((0, 0), p.r, fill=False, color=GREEN, lw=1.8))
-    axes.add_patch(Circle((0, 0), body.radius, color="#333333"))
-    for y in (-body.half_width, body.half_width):
+    axes.add_patch(Circle((0, 0), body.radius_m, color="#333333"))
+    for y in (-body.half_width_m, body.half_width_m):
         axes.plot([0, p.l_th * math.cos(0.5 * p.alpha)], [y, y], color="#333333", lw=0.8, ls=":")
     axes.annotate("", (1.02, 0), (0, 0), arrowprops={"arrowstyle": "->", "color": "#333333"})
     axes.text(1.04, 0, "target", va="center")
     box = {"boxstyle": "square,pad=0.15", "fc": "white", "ec": "none"}
     for text, where, point in (
-        (f"body, radius {body.radius:.2f} m", (-1.35, -0.45), (-0.1, -0.09)),
+        (f"body, radius {body.radius_m:.2f} m", (-1.35, -0.45), (-0.1, -0.09)),
         (f"safety margin r = {p.r:.2f} m", (-1.35, 0.45), (-0.24, 0.18)),
         (f"planning distance $l_{{th}}$ = {p.l_th:.2f} m", (0.62, 0.62), (0.574, 0.175)),
         (f"reference distance $\\sigma_a$ = {p.sigma_a:.2f} m", (0.55, -0.98), (0.55, -0.712)),

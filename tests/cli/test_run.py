@@ -152,7 +152,7 @@ WRONG = {
     "robots": (["--robots", "0"], ["robots", "greater than or equal to 1"]),
     "limit": (["--limit", "-1"], ["limit_s", "greater than 0"]),
     "no file": (["nowhere.yaml"], ["nowhere.yaml", "No such file"]),
-    "body": (["--set", "robot.half_width_m=2"], ["robot.half_width"]),
+    "body": (["--set", "robot.half_width_m=2"], ["robot.half_width_m"]),
 }
 
 

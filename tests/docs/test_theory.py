@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from swarmscope.onboard.body import Body, protection_model
 from swarmscope.onboard.perception.areas import normalise, passable_distance, quadrant_area
 from swarmscope.onboard.planning import nav_scope
 from swarmscope.onboard.planning.fields import (
@@ -20,7 +21,6 @@ from swarmscope.onboard.planning.fields import (
     neighbour_weight,
     yields_to,
 )
-from swarmscope.onboard.robot import Body, protection_model
 from swarmscope.scenarios.scenario import SafetyModel
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -94,7 +94,7 @@ def test_protection_rows(name):
     rows = table("| $r_c$")
     row = next(r for r in rows if r[0] == name)
     radius, half_width, v, a, delay = map(float, row[1:6])
-    p = protection_model(Body(radius=radius, half_width=half_width, v_max=v, a_max=a, sensor_delay=delay))
+    p = protection_model(Body(radius, half_width, v, a, sensor_delay_s=delay))
     assert row[6:] == [
         f"{p.r:.3f}",
         f"{p.l_th:.3f}",
@@ -171,7 +171,7 @@ def test_what_the_page_says_of_the_field():
     assert interaction_force(3.50 * 0.9, 0.9, 1.0) > 0.0 > interaction_force(3.52 * 0.9, 0.9, 1.0)
     assert yields_to(0.5, interaction_force(0.686, 0.9, 1.0), 1.0)
     assert not yields_to(0.5, interaction_force(0.688, 0.9, 1.0), 1.0)
-    real = protection_model(Body(0.43, 0.29, 0.5, 4.0, sensor_delay=0.0575))
+    real = protection_model(Body(0.43, 0.29, 0.5, 4.0, sensor_delay_s=0.0575))
     assert normalise(real.w_n, 5.0) == pytest.approx(TABLE_THRESHOLD, abs=0.002)
 
 

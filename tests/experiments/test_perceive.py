@@ -62,7 +62,7 @@ def test_safe_directions_of_real_scans_lead_the_body_past_all_returns(real):
         near = r < seen.rig.protection.l_th
         for n in np.flatnonzero(seen.safe[k]):
             ahead, across = x * cos[n] + y * sin[n], np.abs(y * cos[n] - x * sin[n])
-            assert not np.any(near & (ahead > 0.0) & (across < seen.rig.body.radius)), (k, n)
+            assert not np.any(near & (ahead > 0.0) & (across < seen.rig.body.radius_m)), (k, n)
 
 
 def test_it_is_what_the_robots_kernels_say(forest_scans):

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from swarmscope.onboard.body import Body, protection_model
 from swarmscope.onboard.perception.areas import normalise, passable_distance, quadrant_area
 from swarmscope.onboard.planning.fields import (
     following_probability,
@@ -15,7 +16,6 @@ from swarmscope.onboard.planning.fields import (
     left_probability,
     neighbour_weight,
 )
-from swarmscope.onboard.robot import Body, protection_model
 
 ALPHA_HALF = math.radians(36.0)
 TABLE_II = {
@@ -47,7 +47,7 @@ def test_simulated_robot_has_the_published_protection_model():
 
 
 def test_real_robot_has_the_published_protection_model():
-    body = Body(radius=0.43, half_width=0.29, v_max=0.5, a_max=4.0, sensor_delay=0.0575)
+    body = Body(radius_m=0.43, half_width_m=0.29, v_max_mps=0.5, a_max_mps2=4.0, sensor_delay_s=0.0575)
     p = protection_model(body)
     assert p.r == pytest.approx(0.49, abs=1e-9)
     assert p.l_th == pytest.approx(0.83, abs=0.005)
@@ -56,7 +56,7 @@ def test_real_robot_has_the_published_protection_model():
 
 
 def test_threshold_of_table_ii_is_1_54():
-    body = Body(radius=0.43, half_width=0.29, v_max=0.5, a_max=4.0, sensor_delay=0.0575)
+    body = Body(radius_m=0.43, half_width_m=0.29, v_max_mps=0.5, a_max_mps2=4.0, sensor_delay_s=0.0575)
     assert normalise(protection_model(body).w_n, 5.0) == pytest.approx(1.54, abs=0.002)
 
 

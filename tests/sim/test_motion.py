@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from helpers import DT, circles_world, place_sim, rig_of, wall, world_of
+from swarmscope.onboard.body import Body
 from swarmscope.onboard.planning._contract import ARRIVED
-from swarmscope.onboard.robot import Body
 from swarmscope.sim.cells import index_robots
 from swarmscope.sim.motion import judge, move
 
@@ -62,7 +62,7 @@ def test_a_constant_turn_is_an_arc(v, w, ticks):
 @settings(max_examples=50)
 @given(st.floats(0.0, 0.5), st.floats(0.0, 0.5), st.floats(0.2, 4.0))
 def test_acceleration_is_limited_and_the_way_follows_from_it(v0, v, a_max):
-    rig = rig_of(Body(a_max=a_max, sensor_delay=0.0, half_width=0.1))
+    rig = rig_of(Body(a_max_mps2=a_max, sensor_delay_s=0.0, half_width_m=0.1))
     sim = at_speed(v0, rig=rig)
     drive(sim, [(v, 0.0)], 1)
     reached = float(sim.robots[0]["v"])
@@ -100,7 +100,7 @@ def test_turning_on_the_spot():
 
 @pytest.mark.parametrize("speed", [1.0, 20.0, 300.0])
 def test_a_fast_robot_does_not_tunnel_through_a_thin_wall(speed):
-    rig = rig_of(Body(v_max=speed, a_max=2e5, half_width=0.1))
+    rig = rig_of(Body(v_max_mps=speed, a_max_mps2=2e5, half_width_m=0.1))
     sim = at_speed(speed, rig=rig, world=world_of(wall((2.0, -9.0), (2.0, 9.0))), substeps=20)
     drive(sim, [(speed, 0.0)], 30)
     assert sim.robots[0]["crashed"] == 1
@@ -136,7 +136,7 @@ def test_two_robots_that_meet_both_stop():
 
 
 def test_fast_robots_do_not_pass_through_each_other():
-    rig = rig_of(Body(v_max=30.0, a_max=1e4, half_width=0.1))
+    rig = rig_of(Body(v_max_mps=30.0, a_max_mps2=1e4, half_width_m=0.1))
     sim, _, _ = place_sim([(-3.0, 0.0, 0.0), (3.0, 0.1, math.pi)], rig=rig)
     sim.robots["v"] = 30.0
     drive(sim, [(30.0, 0.0)] * 2, 1)

@@ -11,9 +11,9 @@ import numpy as np
 
 from swarmscope._jit import jit
 from swarmscope.errors import ConfigError, InputFileError
+from swarmscope.onboard.body import Body
 from swarmscope.onboard.percept import PERCEPT, Rig, Scratch, Sensor, make_rig, new_scratch
 from swarmscope.onboard.perception.safety import safe_directions
-from swarmscope.onboard.robot import Body
 from swarmscope.onboard.sharing.message import MAX_FEATURES_BYTES, encode_features
 from swarmscope.onboard.tick import features
 from swarmscope.sim.scan_files import ScanLog
@@ -138,4 +138,4 @@ def _rig_of(log: ScanLog, beams: int, increment: float, range_m: float, radius_m
         range_sigma=0.0,
         position_sigma=0.0,
     )
-    return make_rig(Body(radius=radius_m, half_width=radius_m), sensor)
+    return make_rig(Body(radius_m=radius_m, half_width_m=radius_m), sensor)

@@ -239,6 +239,6 @@ class Recorder:
         for k in range(percept["n_neighbours"]):
             hide_robot(
                 codes, sensor.angle_min, sensor.increment, sensor.wraps,
-                percept["neighbour_x"][k], percept["neighbour_y"][k], self._rig.body.radius,
+                percept["neighbour_x"][k], percept["neighbour_y"][k], self._rig.body.radius_m,
             )  # fmt: skip
         return codes

@@ -55,7 +55,7 @@ def _look(
     sees: np.ndarray,
     blocked: np.ndarray,
 ) -> None:
-    sensor, radius = rig.sensor, rig.body.radius
+    sensor, radius = rig.sensor, rig.body.radius_m
     for i in range(places.shape[0]):
         x, y = places[i, 0], places[i, 1]
         cast_static(world, x, y, 0.0, beams, ranges)

@@ -11,9 +11,9 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
+from swarmscope.onboard.body import Body, Protection, protection_model
 from swarmscope.onboard.perception.filters import feature_filter, window_half
 from swarmscope.onboard.perception.safety import reach_table
-from swarmscope.onboard.robot import Body, Protection, protection_model
 from swarmscope.onboard.sharing.message import MAX_FEATURES, MAX_PACKET_BYTES
 
 Row: TypeAlias = Any
@@ -212,10 +212,10 @@ def make_rig(
     protection = protection_model(body)
     half = window_half(protection.alpha, sensor.increment)
     angles = sensor.angle_min + sensor.increment * np.arange(sensor.beams)
-    footprint = body.radius + footprint_clearance
+    footprint = body.radius_m + footprint_clearance
     half_alpha = 0.5 * protection.alpha if sector else 0.0
     rules = (
-        (protection.l_th, half_alpha, look_ahead, body.radius + margin),
+        (protection.l_th, half_alpha, look_ahead, body.radius_m + margin),
         (narrow or protection.r, 0.0, 0.0, 0.0),
         (protection.r, 0.0, 0.0, 0.0),
         (protection.l_th, 0.5 * protection.alpha, 0.0, 0.0),

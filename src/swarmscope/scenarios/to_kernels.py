@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from swarmscope.errors import ConfigError
+from swarmscope.onboard.body import Body
 from swarmscope.onboard.percept import Rig, Sensor, make_rig
 from swarmscope.onboard.planning._contract import load_planner, make_params
-from swarmscope.onboard.robot import Body
 from swarmscope.scenarios.read import is_packaged, map_path
 from swarmscope.scenarios.scenario import PlannerModel, Scenario
 from swarmscope.sim.lidar import make_beams
@@ -87,14 +87,7 @@ def make_rig_of(scenario: Scenario) -> Rig:
         range_sigma=noise.range_fraction,
         position_sigma=math.hypot(noise.range_fraction, math.radians(noise.bearing_deg)),
     )
-    body = Body(
-        robot.radius_m,
-        robot.half_width_m,
-        robot.v_max_mps,
-        robot.a_max_mps2,
-        robot.w_max_radps,
-        robot.sensor_delay_s,
-    )
+    body = Body(**robot.model_dump())
     return make_rig(
         body,
         sensor,

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from adversary import closest
 from helpers import DT, Rows, circles_world, make_sensor, place_sim, rig_of, scan_at, world_of
+from swarmscope.onboard.body import Body
 from swarmscope.onboard.control.guard import guard, halt, head_for
-from swarmscope.onboard.robot import Body
 from swarmscope.onboard.sharing.tracks import update_odometry, update_tracks
 from swarmscope.sim.world import WorldSpec, compile_world
 
@@ -37,10 +37,10 @@ def naive_path(v0, v, w, body=BODY):
     speed, h = v0, DT / FINE
     points = [(x, y)]
     for _ in range(FINE):
-        speed += min(body.a_max * h, max(-body.a_max * h, v - speed))
+        speed += min(body.a_max_mps2 * h, max(-body.a_max_mps2 * h, v - speed))
         x, y, yaw = x + speed * h * math.cos(yaw), y + speed * h * math.sin(yaw), yaw + w * h
         points.append((x, y))
-    brake = speed * speed / (2.0 * body.a_max)
+    brake = speed * speed / (2.0 * body.a_max_mps2)
     for k in range(1, 21):
         points.append((x + brake * k / 20 * math.cos(yaw), y + brake * k / 20 * math.sin(yaw)))
     return np.array(points)
@@ -65,18 +65,18 @@ circle_rows = st.lists(
 @given(circle_rows, st.floats(0.0, 0.5), st.floats(-0.2, 0.8), st.floats(-3.0, 3.0))
 def test_after_a_guarded_tick_braking_touches_nothing(circles, v0, v, w):
     """Provided that braking straight on was free before, which the tick before has seen to."""
-    brake = v0 * v0 / (2.0 * BODY.a_max)
+    brake = v0 * v0 / (2.0 * BODY.a_max_mps2)
     straight = np.column_stack([np.linspace(0.0, brake, 50), np.zeros(50)])
-    assume(gap_to(circles, straight) >= BODY.radius + (0.0 if v0 == 0.0 else 0.02))
+    assume(gap_to(circles, straight) >= BODY.radius_m + (0.0 if v0 == 0.0 else 0.02))
     rig = rig_of()
     new_v, new_w, slowed = guarded(scan_at(circles_world(circles), rig), v0, v, w)
-    assert 0.0 <= new_v <= BODY.v_max
-    assert abs(new_w) <= BODY.w_max
+    assert 0.0 <= new_v <= BODY.v_max_mps
+    assert abs(new_w) <= BODY.w_max_radps
     points = naive_path(v0, new_v, new_w)
-    assert gap_to(circles, points) >= BODY.radius - 1e-3
+    assert gap_to(circles, points) >= BODY.radius_m - 1e-3
     if not slowed:
-        assert new_v == pytest.approx(min(BODY.v_max, max(0.0, v)))
-        assert new_w == pytest.approx(min(BODY.w_max, max(-BODY.w_max, w)))
+        assert new_v == pytest.approx(min(BODY.v_max_mps, max(0.0, v)))
+        assert new_w == pytest.approx(min(BODY.w_max_radps, max(-BODY.w_max_radps, w)))
 
 
 @settings(max_examples=200)
@@ -85,7 +85,7 @@ def test_what_is_plainly_free_is_let_through(circles, v, w):
     """A command whose naive path keeps twice the clearance from everything is not touched."""
     rig = rig_of()
     points = naive_path(0.0, v, w)
-    assume(gap_to(circles, points) > BODY.radius + 2.0 * rig.clearance + 0.01)
+    assume(gap_to(circles, points) > BODY.radius_m + 2.0 * rig.clearance + 0.01)
     assert guarded(scan_at(circles_world(circles), rig), 0.0, v, w) == pytest.approx((v, w, False))
 
 
@@ -122,9 +122,9 @@ def test_commands_that_are_no_numbers_become_safe_ones(v, w):
     new_v, new_w, _ = guarded(ranges, 0.2, v, w)
     assert math.isfinite(new_v)
     assert math.isfinite(new_w)
-    assert 0.0 <= new_v <= BODY.v_max
-    assert abs(new_w) <= BODY.w_max
-    assert gap_to([(0.5, 0.0, 0.2)], naive_path(0.2, new_v, new_w)) >= BODY.radius
+    assert 0.0 <= new_v <= BODY.v_max_mps
+    assert abs(new_w) <= BODY.w_max_radps
+    assert gap_to([(0.5, 0.0, 0.2)], naive_path(0.2, new_v, new_w)) >= BODY.radius_m
 
 
 @pytest.mark.parametrize("bearing_deg", [0, 60, -85, 110, -120, 180])
@@ -160,7 +160,7 @@ def meeting(distance, v0, v, rig, seen=True):
         rows.see((3, distance, 0.0, math.pi))
     update_odometry(rows.percept, rows.memory)
     update_tracks(rows.percept, rows.memory, rig, 0.0, 0.0)
-    return guarded(scan_at(circles_world([(distance, 0.0, rig.body.radius)]), rig), v0, v, 0.0, rows=rows)
+    return guarded(scan_at(circles_world([(distance, 0.0, rig.body.radius_m)]), rig), v0, v, 0.0, rows=rows)
 
 
 @settings(max_examples=100)
@@ -170,7 +170,7 @@ def test_each_robot_uses_only_its_half_of_the_gap(distance, v):
     new_v, _, _ = meeting(distance, 0.0, v, rig)
     path = naive_path(0.0, new_v, 0.0)
     moved, stopped = path[FINE, 0], path[-1, 0]
-    half = 0.5 * (distance - 2.0 * BODY.radius - rig.clearance)
+    half = 0.5 * (distance - 2.0 * BODY.radius_m - rig.clearance)
     assert stopped + (stopped - moved) <= half + 1e-3  # the braking distance is kept twice
     wanted = naive_path(0.0, v, 0.0)
     if 2.0 * wanted[-1, 0] - wanted[FINE, 0] < half - 1e-3:
@@ -186,9 +186,9 @@ def test_a_neighbour_is_kept_off_even_when_its_returns_are_missing():
 
 BODIES = {
     "published": Body(),
-    "fast": Body(v_max=1.5, a_max=2.0),
-    "weak brakes": Body(v_max=0.6, a_max=0.6),
-    "large": Body(radius=0.43, half_width=0.29, a_max=4.0, sensor_delay=0.0575),
+    "fast": Body(v_max_mps=1.5, a_max_mps2=2.0),
+    "weak brakes": Body(v_max_mps=0.6, a_max_mps2=0.6),
+    "large": Body(radius_m=0.43, half_width_m=0.29, a_max_mps2=4.0, sensor_delay_s=0.0575),
 }
 
 
@@ -200,7 +200,7 @@ def test_adversarial_commands_never_touch_obstacles(name):
     smallest = math.inf
     for run in range(40):
         rows = np.column_stack([rng.uniform(-3, 3, (30, 2)), rng.uniform(0.05, 0.4, 30)])
-        rows = rows[np.hypot(rows[:, 0], rows[:, 1]) - rows[:, 2] > body.radius + rig.clearance]
+        rows = rows[np.hypot(rows[:, 0], rows[:, 1]) - rows[:, 2] > body.radius_m + rig.clearance]
         sim, shared, _ = place_sim(
             [(0.0, 0.0, rng.uniform(-3, 3))], world=circles_world(rows), rig=rig, seed=run
         )
@@ -235,7 +235,7 @@ def test_adversarial_robots_never_touch_each_other(name, robots):
         starts = []
         while len(starts) < robots:
             p = rng.uniform(-0.8, 0.8, 2)
-            if all(math.hypot(*(p - q[:2])) > 2.0 * body.radius + 2.0 * rig.clearance for q in starts):
+            if all(math.hypot(*(p - q[:2])) > 2.0 * body.radius_m + 2.0 * rig.clearance for q in starts):
                 starts.append((*p, rng.uniform(-3, 3)))
         sim, shared, _ = place_sim(starts, world=world, rig=rig, seed=run)
         smallest = min(smallest, closest(sim, shared, rig, 60, run % 3))

@@ -111,7 +111,7 @@ def test_every_return_in_reach_lies_on_a_segment(trees):
     robot = Robot(scan_at(circles_world(trees), rig_of()))
     assert 0 < len(robot.lines) <= orca.MAX_LINES
     ranges, rig = robot.ranges[0], robot.rig
-    reach = rig.body.v_max * robot.params.obstacle_horizon_s + rig.body.radius + robot.params.margin
+    reach = rig.body.v_max_mps * robot.params.obstacle_horizon_s + rig.body.radius_m + robot.params.margin
     near = [n for n in range(360) if ranges[n] < reach]
     assert near
     for n in near:

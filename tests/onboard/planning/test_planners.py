@@ -72,8 +72,8 @@ class Robots(Rows):
         d, body = self.decisions, self.rig.body
         assert np.isfinite(d["v"]).all()
         assert np.isfinite(d["w"]).all()
-        assert ((d["v"] >= 0.0) & (d["v"] <= body.v_max + 1e-9)).all()
-        assert (np.abs(d["w"]) <= body.w_max + 1e-9).all()
+        assert ((d["v"] >= 0.0) & (d["v"] <= body.v_max_mps + 1e-9)).all()
+        assert (np.abs(d["w"]) <= body.w_max_radps + 1e-9).all()
         assert np.isfinite(d["heading"]).all()
         assert (d["state"] < len(STATE_NAMES)).all()
         assert (d["reason"] < len(REASON_NAMES)).all()

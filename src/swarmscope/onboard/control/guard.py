@@ -38,10 +38,10 @@ def guard(
     wanted, w = decision["v"], decision["w"]
     if not (math.isfinite(wanted) and math.isfinite(w)):
         wanted, w = 0.0, 0.0
-    w = min(body.w_max, max(-body.w_max, w))
-    wanted = min(body.v_max, max(0.0, wanted))
+    w = min(body.w_max_radps, max(-body.w_max_radps, w))
+    wanted = min(body.v_max_mps, max(0.0, wanted))
     count, nearest = _near_beams(ranges, percept["dt_s"], rig, near)
-    need = min(body.radius + rig.clearance, nearest - 1e-6)  # already too close: never closer
+    need = min(body.radius_m + rig.clearance, nearest - 1e-6)  # already too close: never closer
     for fraction in FRACTIONS:
         v = wanted * fraction
         if _passes(ranges, percept, shared, v0, v, w, near, count, need, rig):
@@ -58,8 +58,8 @@ def _near_beams(ranges: np.ndarray, dt: float, rig: Rig, near: np.ndarray) -> tu
     Return how many, and the smallest valid range among them [m].
     """
     body = rig.body
-    reach = body.v_max * (dt + rig.latency) + 2.0 * body.v_max * body.v_max / body.a_max
-    limit = body.radius + 2.0 * rig.clearance + reach
+    reach = body.v_max_mps * (dt + rig.latency) + 2.0 * body.v_max_mps * body.v_max_mps / body.a_max_mps2
+    limit = body.radius_m + 2.0 * rig.clearance + reach
     least = least_range(rig)
     count = 0
     nearest = math.inf
@@ -75,7 +75,7 @@ def _near_beams(ranges: np.ndarray, dt: float, rig: Rig, near: np.ndarray) -> tu
 @jit_inline
 def least_range(rig: Rig) -> float:
     """Return the smallest range that can be a return of something else: others are invalid, or inside the body."""
-    return max(rig.sensor.range_min, 0.5 * rig.body.radius)
+    return max(rig.sensor.range_min, 0.5 * rig.body.radius_m)
 
 
 @jit_inner
@@ -101,7 +101,7 @@ def _passes(
     x1, y1, x2, y2, x3, y3, x4, y4 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     x, y = x0, y0
     for k in range(STEPS):
-        speed, way = ramp(speed, v, body.a_max, step)
+        speed, way = ramp(speed, v, body.a_max_mps2, step)
         x += way * math.cos(yaw + 0.5 * w * step)
         y += way * math.sin(yaw + 0.5 * w * step)
         yaw += w * step
@@ -113,7 +113,7 @@ def _passes(
             x3, y3 = x, y
         else:
             x4, y4 = x, y
-    brake = speed * speed / (2.0 * body.a_max)
+    brake = speed * speed / (2.0 * body.a_max_mps2)
     x5, y5 = x + brake * math.cos(yaw), y + brake * math.sin(yaw)
     if x5 * x5 + y5 * y5 + brake < 1e-10 and v0 < 1e-6:
         return True
@@ -123,7 +123,7 @@ def _passes(
         n = near[k]
         s = ranges[n]
         if not s >= least_range(rig):  # forbid that way
-            s = body.radius + rig.clearance
+            s = body.radius_m + rig.clearance
         px, py = s * rig.cos[n], s * rig.sin[n]
         gap = _point_gap(percept, shared, px, py, rig)
         if gap and not _in_own_half(px, py, s, x4, y4, x5, y5, brake, rig):
@@ -170,7 +170,7 @@ def _in_own_half(
     towards = max(moved, stopped)
     if towards <= 1e-6:
         return True
-    return towards + max(0.0, stopped - moved) <= 0.5 * (s - rig.body.radius - rig.clearance)
+    return towards + max(0.0, stopped - moved) <= 0.5 * (s - rig.body.radius_m - rig.clearance)
 
 
 @jit_inner
@@ -186,8 +186,8 @@ def _clear_of_tracks(
         y = c * shared["track_y"][t] - s * shared["track_x"][t]
         d = math.sqrt(x * x + y * y)
         error = rig.sensor.position_sigma * d
-        surface = d - rig.body.radius - error
-        if surface > 4.0 * rig.body.radius + 1.0 or d < 1e-6:
+        surface = d - rig.body.radius_m - error
+        if surface > 4.0 * rig.body.radius_m + 1.0 or d < 1e-6:
             continue
         scale = surface / d
         if not _in_own_half(x * scale, y * scale, max(surface, 1e-6), x4, y4, x5, y5, brake, rig):
@@ -205,4 +205,4 @@ def halt(decision: Row) -> None:
 def head_for(decision: Row, percept: Row, heading: float, speed: float, rig: Rig) -> None:
     """Ask for driving towards ``heading`` (body frame) at ``speed`` once turned."""
     decision["heading"] = heading
-    decision["v"], decision["w"] = steer(heading, speed, rig.body.w_max, percept["dt_s"])
+    decision["v"], decision["w"] = steer(heading, speed, rig.body.w_max_radps, percept["dt_s"])

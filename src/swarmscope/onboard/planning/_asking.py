@@ -21,7 +21,7 @@ def request_ahead(
     now = percept["now_s"]
     if now - shared["asked_s"] < every_s:
         return
-    horizon = max(rig.protection.l_th, rig.look_ahead) + ahead_s * rig.body.v_max
+    horizon = max(rig.protection.l_th, rig.look_ahead) + ahead_s * rig.body.v_max_mps
     if obstacle_ahead(masked, percept, rig, horizon):
         ask_neighbours(percept, shared, decision, rig)
 

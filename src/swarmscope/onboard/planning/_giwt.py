@@ -264,7 +264,7 @@ def look(i: int, ranges: np.ndarray, percepts: np.ndarray, rig: Rig, codes: np.n
     for k in range(percept["n_neighbours"]):
         hide_robot(
             codes, sensor.angle_min, sensor.increment, sensor.wraps,
-            percept["neighbour_x"][k], percept["neighbour_y"][k], rig.body.radius,
+            percept["neighbour_x"][k], percept["neighbour_y"][k], rig.body.radius_m,
         )  # fmt: skip
 
 
@@ -415,7 +415,7 @@ def key_point_near(
     ``work (M,)`` is the scan without moving neighbours; ``nearer``, ``edges``, ``safe`` are scratch.
     """
     sensor = rig.sensor
-    way = params.ask_ahead_s * rig.body.v_max
+    way = params.ask_ahead_s * rig.body.v_max_mps
     for n in range(sensor.beams):
         nearer[n] = max(sensor.range_min, work[n] - way) if work[n] >= sensor.range_min else work[n]
     safe_directions(
@@ -475,7 +475,7 @@ def prepare(
     safe_directions(work, sensor.range_min, sensor.range_max, sensor.wraps, rig.reach[BODY_RULE], edges, safe)
     if dh_bug.advance(ranges, work, percept, shared, memory, decision, safe, rig, _driving(params)):
         memory["stage"] = DRIVES
-        horizon = max(rig.look_ahead, rig.protection.l_th) + params.ask_ahead_s * rig.body.v_max
+        horizon = max(rig.look_ahead, rig.protection.l_th) + params.ask_ahead_s * rig.body.v_max_mps
         if (
             params.ask
             and memory["mode"] != AT_GOAL

@@ -412,10 +412,10 @@ def _drive(ranges: np.ndarray, percept: Row, decision: Row, heading: float, rig:
     sensor, body = rig.sensor, rig.body
     dt = percept["dt_s"]
     allowed = safe_speed(
-        ranges, sensor.range_min, rig.cos, rig.sin, heading, rig.footprint, body.v_max, body.a_max, dt,
+        ranges, sensor.range_min, rig.cos, rig.sin, heading, rig.footprint, body.v_max_mps, body.a_max_mps2, dt,
         0.5 * rig.protection.alpha,
     )  # fmt: skip
-    last = arrival_speed(percept["goal_distance"] - 0.5 * params.arrive_m, body.v_max, body.a_max, dt)
+    last = arrival_speed(percept["goal_distance"] - 0.5 * params.arrive_m, body.v_max_mps, body.a_max_mps2, dt)
     head_for(decision, percept, heading, min(last, max(allowed, params.creep)), rig)
 
 
@@ -452,7 +452,7 @@ def _must_wait(percept: Row, shared: Row, decision: Row, rig: Rig, params: Param
     than two footprints. It ends once it has passed: then the distance grows.
     """
     travel = percept["compass"] + decision["heading"]
-    vx, vy = rig.body.v_max * math.cos(travel), rig.body.v_max * math.sin(travel)
+    vx, vy = rig.body.v_max_mps * math.cos(travel), rig.body.v_max_mps * math.sin(travel)
     for t in range(PEERS):
         if shared["track_id"][t] < 0 or shared["track_id"][t] >= percept["id"]:
             continue

@@ -224,7 +224,7 @@ def decide(
     watch_progress(memory, goal, now, params.stuck_s)
     sensor = rig.sensor
     bearing = percept["goal_bearing"]
-    speed = arrival_speed(goal - 0.5 * params.arrive_m, rig.body.v_max, rig.body.a_max, percept["dt_s"])
+    speed = arrival_speed(goal - 0.5 * params.arrive_m, rig.body.v_max_mps, rig.body.a_max_mps2, percept["dt_s"])
     final = goal <= max(rig.protection.l_th + rig.footprint, rig.look_ahead)
     if final:
         free = corridor_length(masked, sensor.range_min, rig.cos, rig.sin, bearing, rig.footprint, goal) >= goal

@@ -165,11 +165,11 @@ def _library() -> Any:
 def _ask_library(library: Any, memories: np.ndarray, percepts: np.ndarray, rig: Rig, params: Params) -> None:
     """Write the library's answer to every robot that has a preferred velocity into its memory."""
     segment, neighbour, orca = library
-    orca.radius = rig.body.radius
+    orca.radius = rig.body.radius_m
     orca.safety_margin = params.margin
     orca.time_horizon = params.horizon_s
     orca.static_time_horizon = params.obstacle_horizon_s
-    orca.horizon = 2.0 * params.horizon_s * rig.body.v_max + 2.0
+    orca.horizon = 2.0 * params.horizon_s * rig.body.v_max_mps + 2.0
     state = orca.environment_state
     lines, others, radii = memories["lines"], memories["others"], memories["radii"].tolist()
     asked = memories["lines_n"].tolist()
@@ -272,13 +272,14 @@ def _prefer(
     sensor = rig.sensor
     final = goal <= max(rig.protection.l_th + rig.footprint, rig.look_ahead)
     limit = min(goal, sensor.range_max)
-    half_width = rig.body.radius + params.margin
+    half_width = rig.body.radius_m + params.margin
     way = corridor_length(work, sensor.range_min, rig.cos, rig.sin, bearing, half_width, limit)
     memory["free"] = way >= min(goal, rig.look_ahead)
     if params.deadlock > 0.0:
         _watch(percept, memory, safe, way, rig, params)
     memory["turn"] = 0.0
-    memory["speed"] = arrival_speed(goal - 0.5 * params.arrive_m, rig.body.v_max, rig.body.a_max, percept["dt_s"])
+    way_left = goal - 0.5 * params.arrive_m
+    memory["speed"] = arrival_speed(way_left, rig.body.v_max_mps, rig.body.a_max_mps2, percept["dt_s"])
     decision["state"], decision["reason"] = ADVANCE, R_FINAL if final else R_FREE
     if memory["side"] != 0:
         _follow(percept, memory, decision, work, safe, narrow, edges, rig, params)
@@ -296,7 +297,7 @@ def _watch(percept: Row, memory: Row, safe: np.ndarray, way: float, rig: Rig, pa
     """
     goal, now = percept["goal_distance"], percept["now_s"]
     free = memory["free"]
-    if goal < memory["best"] - params.progress * params.stall_s * rig.body.v_max:
+    if goal < memory["best"] - params.progress * params.stall_s * rig.body.v_max_mps:
         memory["best"], memory["best_s"] = goal, now
         if memory["side"] == 0:
             memory["last_side"] = 0
@@ -371,7 +372,7 @@ def _follow(
         heading = memory["lost"] - percept["compass"]
         decision["reason"] = R_LOST
     memory["turn"] = wrap_angle(heading - bearing)
-    memory["speed"] = rig.body.v_max
+    memory["speed"] = rig.body.v_max_mps
 
 
 @jit_inner
@@ -382,7 +383,7 @@ def _longest_way(work: np.ndarray, rig: Rig) -> float:
     for n in range(0, sensor.beams, LOST_BEAMS):
         bearing = sensor.angle_min + n * sensor.increment
         way = corridor_length(
-            work, sensor.range_min, rig.cos, rig.sin, bearing, rig.body.radius + rig.clearance, sensor.range_max
+            work, sensor.range_min, rig.cos, rig.sin, bearing, rig.body.radius_m + rig.clearance, sensor.range_max
         )
         if way > best:
             best, at = way, bearing
@@ -407,7 +408,7 @@ def _neighbours(percept: Row, shared: Row, memory: Row, rig: Rig, params: Params
             continue
         x, y = shared["track_x"][t], shared["track_y"][t]
         memory["others"][count, 0, 0], memory["others"][count, 0, 1] = c * x + s * y, c * y - s * x
-        memory["radii"][count] = rig.body.radius + rig.sensor.position_sigma * math.sqrt(x * x + y * y)
+        memory["radii"][count] = rig.body.radius_m + rig.sensor.position_sigma * math.sqrt(x * x + y * y)
         x, y = shared["track_vx"][t], shared["track_vy"][t]
         memory["others"][count, 1, 0], memory["others"][count, 1, 1] = c * x + s * y, c * y - s * x
         count += 1
@@ -424,7 +425,7 @@ def _segments(
     then every chain is divided where it is farthest from its chord (Douglas and Peucker) until ``LINE_ERROR`` holds.
     """
     sensor = rig.sensor
-    reach = rig.body.v_max * params.obstacle_horizon_s + rig.body.radius + params.margin
+    reach = rig.body.v_max_mps * params.obstacle_horizon_s + rig.body.radius_m + params.margin
     count = 0
     for n in range(sensor.beams):
         if sensor.range_min <= work[n] < reach and work[n] > 0.0:
@@ -437,7 +438,7 @@ def _segments(
         gap = _gap(work, hits[k], hits[(k + 1) % count], rig)
         if gap > widest:
             widest, last = gap, k
-    closed = 2.0 * (rig.body.radius + params.margin)
+    closed = 2.0 * (rig.body.radius_m + params.margin)
     error = LINE_ERROR
     while True:
         if _divide(percept, memory, work, keep, hits, count, (last + 1) % count, closed, error, rig):
@@ -550,7 +551,7 @@ def _command(percept: Row, memory: Row, decision: Row, rig: Rig, params: Params)
     bearing = percept["goal_bearing"]
     c, s = math.cos(bearing), math.sin(bearing)
     x, y = c * memory["ux"] - s * memory["uy"], s * memory["ux"] + c * memory["uy"]
-    speed = min(rig.body.v_max, math.sqrt(x * x + y * y))
+    speed = min(rig.body.v_max_mps, math.sqrt(x * x + y * y))
     heading = math.atan2(y, x) if speed > 1e-6 else 0.0
     if not speed >= params.creep * memory["speed"] and memory["free"] == 0 and memory["side"] == 0:
         speed = 0.0

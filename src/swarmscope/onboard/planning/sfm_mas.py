@@ -130,7 +130,7 @@ def step(
     else:
         memory["travel"] += math.sqrt(percept["odom_x"] ** 2 + percept["odom_y"] ** 2)
         watch_progress(memory, goal, percept["now_s"], params.stuck_s)
-        speed = arrival_speed(goal - 0.5 * params.arrive_m, rig.body.v_max, rig.body.a_max, percept["dt_s"])
+        speed = arrival_speed(goal - 0.5 * params.arrive_m, rig.body.v_max_mps, rig.body.a_max_mps2, percept["dt_s"])
         if free and (memory["strict"] == 0 or may_leave(work, percept, memory, rig)):
             advance(percept, memory, decision, rig, speed, R_FINAL if is_final(percept, rig) else R_FREE)
         elif memory["mode"] == FOLLOW or _decide(

@@ -83,8 +83,8 @@ def _limit_speed_and_anchor(shared: Row, rig: Rig, now: float) -> None:
         vx, vy = shared["track_vx"][t], shared["track_vy"][t]
         speed = math.sqrt(vx * vx + vy * vy)
         factor = 0.8 if shared["track_seen_s"][t] < now else 1.0
-        if speed > rig.body.v_max:
-            factor *= rig.body.v_max / speed
+        if speed > rig.body.v_max_mps:
+            factor *= rig.body.v_max_mps / speed
         shared["track_vx"][t] *= factor
         shared["track_vy"][t] *= factor
         x, y = shared["track_x"][t], shared["track_y"][t]
@@ -163,4 +163,4 @@ def mask_moving_neighbours(
 def neighbour_reach(distance: float, rig: Rig) -> float:
     """Return how far from a neighbour's estimated centre its returns may lie [m], errors included."""
     noise = rig.sensor.position_sigma + rig.sensor.range_sigma
-    return rig.body.radius + 0.06 + 2.0 * noise * distance
+    return rig.body.radius_m + 0.06 + 2.0 * noise * distance

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from swarmscope.errors import SwarmscopeError
 from swarmscope.experiments.results import Run
-from swarmscope.onboard.robot import Body, protection_model
+from swarmscope.onboard.body import Body, protection_model
 from swarmscope.scenarios.read import parse_scenario
 from swarmscope.viewing.pictures import FAINT, INK
 from swarmscope.viewing.report import words
@@ -190,7 +190,5 @@ def _scale_bar(axes: Axes, reach: float) -> None:
 
 def _sigma(run: Run) -> float:
     robot = parse_scenario(run.config, f"run of seed {run.seed}").robot
-    body = Body(
-        robot.radius_m, robot.half_width_m, robot.v_max_mps, robot.a_max_mps2, robot.w_max_radps, robot.sensor_delay_s
-    )
+    body = Body(**robot.model_dump())
     return protection_model(body).sigma_a

@@ -10,9 +10,9 @@ import numpy as np
 from swarmscope.errors import SwarmscopeError
 from swarmscope.experiments.experiment import Sweep, merged, sweep_label
 from swarmscope.experiments.results import Run, flow_time_increases
+from swarmscope.onboard.body import Body, protection_model
 from swarmscope.onboard.planning._contract import load_planner
 from swarmscope.onboard.planning.fields import interaction_force
-from swarmscope.onboard.robot import Body, protection_model
 from swarmscope.scenarios.scenario import RobotModel
 from swarmscope.viewing.pictures import FAINT, INK
 from swarmscope.viewing.report import words
@@ -243,9 +243,7 @@ def field_picture(material: Material) -> Picture:
     runs: list[Run] = material.of("all", planner)
     keys = runs[0].config if runs else material.experiment.scenario
     robot = RobotModel.model_validate(keys.get("robot", {}))
-    body = Body(
-        robot.radius_m, robot.half_width_m, robot.v_max_mps, robot.a_max_mps2, robot.w_max_radps, robot.sensor_delay_s
-    )
+    body = Body(**robot.model_dump())
     sigma = protection_model(body).sigma_a
     params = _defaults(material, planner) | dict(material.planner_keys(planner).get("params", {}))
     w_i = float(params.get("w_i", 1.0))

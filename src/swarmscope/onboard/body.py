@@ -12,15 +12,15 @@ from swarmscope.errors import ConfigError
 class Body(NamedTuple):
     """A robot's data sheet. Lengths in m, speeds in m/s and rad/s, times in s."""
 
-    radius: float = 0.15
+    radius_m: float = 0.15
     """Radius of the circumcircle (r_c in Nav-SCOPE 18, r_e in SFM-MAS 16)."""
-    half_width: float = 0.15
+    half_width_m: float = 0.15
     """Lateral half width r_0."""
-    v_max: float = 0.5
-    a_max: float = 2.0
-    w_max: float = 2.0
+    v_max_mps: float = 0.5
+    a_max_mps2: float = 2.0
+    w_max_radps: float = 2.0
     """Largest turn rate; not published for these robots, ours (common small platforms: 1.8 to 2.8 rad/s)."""
-    sensor_delay: float = 0.175
+    sensor_delay_s: float = 0.175
     """t_d; 0.175 s reproduces the published r = 0.30 m and sigma_a = 0.90 m."""
 
 
@@ -81,18 +81,18 @@ def following_threshold(r: float, l_th: float, s_d: float, s_b: float) -> float:
 def protection_model(body: Body) -> Protection:
     """Return the protection model of ``body``; raises ConfigError when the data sheet is impossible."""
     for name, value in body._asdict().items():
-        if not (math.isfinite(value) and value >= 0.0) or (value == 0.0 and name != "sensor_delay"):
+        if not (math.isfinite(value) and value >= 0.0) or (value == 0.0 and name != "sensor_delay_s"):
             raise ConfigError(f"robot.{name}", f"must be a positive finite number, not {value!r}")
-    s_d = delay_distance(body.v_max, body.sensor_delay)
-    s_b = braking_distance(body.v_max, body.a_max)
-    r = safety_margin(body.radius, s_d, s_b)
-    if body.half_width > r:
-        raise ConfigError("robot.half_width", f"{body.half_width} m is more than the safety margin r = {r:.3f} m")
-    l_th = planning_distance(body.half_width, r)
+    s_d = delay_distance(body.v_max_mps, body.sensor_delay_s)
+    s_b = braking_distance(body.v_max_mps, body.a_max_mps2)
+    r = safety_margin(body.radius_m, s_d, s_b)
+    if body.half_width_m > r:
+        raise ConfigError("robot.half_width_m", f"{body.half_width_m} m is more than the safety margin r = {r:.3f} m")
+    l_th = planning_distance(body.half_width_m, r)
     return Protection(
         r=r,
         l_th=l_th,
-        alpha=scope_angle(body.half_width, r),
+        alpha=scope_angle(body.half_width_m, r),
         sigma_a=reference_distance(r, s_d, s_b),
         w_n=following_threshold(r, l_th, s_d, s_b),
         s_d=s_d,
