@@ -16,11 +16,12 @@ import numpy as np
 
 from bench_step import prepared, step_us
 from swarmscope.errors import SwarmscopeError
-from swarmscope.onboard.percept import DECISION, new_scratch
-from swarmscope.onboard.perception.local_map import CELLS, CHANNELS
+from swarmscope.onboard.percept import DECISION
+from swarmscope.onboard.view import new_swarm
+from swarmscope.onboard.network.local_map import CELLS, CHANNELS
 from swarmscope.onboard.planning import giwt
 from swarmscope.onboard.planning._giwt import Params, draw, empty_graph, gather, look, put_answer
-from swarmscope.onboard.planning._giwt_graph import FEATURES
+from swarmscope.onboard.network.graph import FEATURES
 from swarmscope.scenarios.read import parse_scenario
 from swarmscope.scenarios.to_kernels import make_rig_of
 

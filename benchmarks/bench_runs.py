@@ -15,7 +15,7 @@ from swarmscope.errors import SwarmscopeError
 from swarmscope.experiments.work import make_job, unit_key, work, world_key
 from swarmscope.judging.run import find_references, play
 from swarmscope.judging.sides import make_advice
-from swarmscope.onboard.planning._contract import load_planner, planner_names
+from swarmscope.onboard.planners import load_planner, planner_names
 from swarmscope.scenarios.read import parse_scenario
 from swarmscope.scenarios.to_kernels import complete, make_setup
 

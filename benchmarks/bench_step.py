@@ -10,10 +10,11 @@ import time
 
 import numpy as np
 
-from swarmscope.onboard.percept import DECISION, PERCEPT, new_scratch, new_shared
+from swarmscope.onboard.percept import DECISION, PERCEPT, new_shared
+from swarmscope.onboard.view import new_swarm
 from swarmscope.onboard.perception.filters import filter_padded, prepare_scan
 from swarmscope.onboard.planning import nav_scope
-from swarmscope.onboard.planning._contract import make_params
+pass
 from swarmscope.onboard.sharing.message import encode_features
 from swarmscope.scenarios.read import parse_scenario
 from swarmscope.scenarios.to_kernels import make_rig_of, make_setup

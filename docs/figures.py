@@ -14,7 +14,7 @@ from matplotlib.patches import Circle, Wedge
 
 from swarmscope.scenarios.read import parse_scenario
 from swarmscope.scenarios.to_kernels import make_rig_of, make_setup
-from swarmscope.onboard.percept import Rig
+from swarmscope.onboard.rig import Rig
 from swarmscope.onboard.perception.areas import passable_distance
 from swarmscope.onboard.perception.features import extrema, reconstruct
 from swarmscope.onboard.perception.filters import (
@@ -25,7 +25,7 @@ from swarmscope.onboard.perception.filters import (
     scope_filter,
 )
 from swarmscope.onboard.perception.safety import safe_directions
-from swarmscope.onboard.planning.fields import interaction_force
+from swarmscope.onboard.deciding.fields import interaction_force
 from swarmscope.onboard.body import Body, protection_model
 from swarmscope.sim.lidar import cast_static, make_beams
 from swarmscope.sim.world import compile_world
