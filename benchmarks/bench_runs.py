@@ -37,7 +37,7 @@ def costs(planner: str, seed: int) -> dict[str, float]:
     times.append(time.perf_counter())
     references = find_references(scenario, setup)
     times.append(time.perf_counter())
-    if getattr(load_planner(planner), "TOLD_SIDE", False):
+    if load_planner(planner).told:
         make_advice(setup, scenario.robot.radius_m + scenario.safety.margin_m)
     times.append(time.perf_counter())
     run_s = play(scenario, references=references).trace.wall_s
@@ -77,7 +77,7 @@ def main() -> None:
     print("a million units on 1, 16, 1000 cores")
     for planner in planner_names():
         try:
-            getattr(load_planner(planner), "check_available", lambda: None)()
+            load_planner(planner).check_available()
         except SwarmscopeError as error:
             print(f"{planner:10s} left out: {error}")
             continue
