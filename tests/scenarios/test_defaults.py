@@ -12,6 +12,7 @@ from pydantic import BaseModel
 from swarmscope.onboard.body import Body
 from swarmscope.onboard.percept import make_rig
 from swarmscope.scenarios.scenario import (
+    RIG,
     GuardModel,
     LidarModel,
     MapModel,
@@ -56,12 +57,11 @@ def test_the_rig_of_a_scenario_is_the_one_of_a_robot():
     ("model", "kernels"),
     [
         (RobotModel, Body()._asdict()),
-        (RadioModel, Radio()._asdict() | {"exact_features": make_rig.__kwdefaults__["exact_features"]}),
-        (GuardModel, {f"{key}_m": value for key, value in make_rig.__kwdefaults__.items()}
-         | {"persistence_s": make_rig.__kwdefaults__["persistence"]}),
-        (SafetyModel, make_rig.__kwdefaults__ | {f"{key}_m": value for key, value in make_rig.__kwdefaults__.items()}),
+        (RadioModel, Radio()._asdict() | {"exact_features": RIG["exact_features"]}),
+        (GuardModel, RIG),
+        (SafetyModel, RIG),
     ],
-)  # fmt: skip
+)
 def test_each_default_of_the_schema_is_the_one_of_the_tuple(model, kernels):
     for name, field in model.model_fields.items():
         assert field.default == kernels[name], name

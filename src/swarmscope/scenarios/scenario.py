@@ -24,8 +24,11 @@ NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 BODY: Final = Body()
 NOISE: Final = Noise()
 RADIO: Final = Radio()
-RIG: Final[dict[str, Any]] = make_rig.__kwdefaults__ or {}
-"""What the kernels run on when nobody says otherwise."""
+RIG: Final[dict[str, Any]] = {
+    key if isinstance(value, bool) else f"{key}_s" if key == "persistence" else f"{key}_m": value
+    for key, value in (make_rig.__kwdefaults__ or {}).items()
+}
+"""What robots run on when nobody says otherwise, by the keys of a scenario."""
 
 
 class _Strict(BaseModel):
@@ -97,11 +100,11 @@ class RadioModel(_Strict):
 class GuardModel(_Strict):
     """Distances kept free around the body."""
 
-    clearance_m: NotNegative = RIG["clearance"]
+    clearance_m: NotNegative = RIG["clearance_m"]
     """Kept free around the body by the guard, which slows down or stops [m]."""
-    footprint_clearance_m: NotNegative = RIG["footprint_clearance"]
+    footprint_clearance_m: NotNegative = RIG["footprint_clearance_m"]
     """Added to the radius where ways are planned: directions that the widened body can take are safe [m]."""
-    persistence_s: NotNegative = RIG["persistence"]
+    persistence_s: NotNegative = RIG["persistence_s"]
     """How long a neighbour that is out of sight is remembered [s]."""
 
 
@@ -110,11 +113,11 @@ class SafetyModel(_Strict):
 
     sector: bool = RIG["sector"]
     """Demand a free sector as wide as the scope angle within the planning distance l_th, as printed (3)."""
-    look_ahead_m: NotNegative = RIG["look_ahead"]
+    look_ahead_m: NotNegative = RIG["look_ahead_m"]
     """How far ahead a direction must be free; 0 leaves it at l_th [m]."""
-    margin_m: NotNegative = RIG["margin"]
+    margin_m: NotNegative = RIG["margin_m"]
     """Kept on both sides of the body within ``look_ahead_m`` [m]."""
-    narrow_m: NotNegative = RIG["narrow"]
+    narrow_m: NotNegative = RIG["narrow_m"]
     """How far ahead a gap must be free that the body just fits, when no direction is safe; 0 is r [m]."""
 
 
