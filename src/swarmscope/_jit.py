@@ -22,7 +22,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 PACKAGE = Path(__file__).parent
-NO_KERNELS = frozenset({"cli", "viewing", "scenarios", "judging", "experiments"})
+NO_KERNELS = frozenset({"api.py", "cli", "viewing", "scenarios", "judging", "experiments"})
 """Parts without kernels; the few files of theirs that have some import this module and are found by that."""
 KEPT_CACHES = 8
 """Kernel caches of earlier states of the sources that are left on disk."""

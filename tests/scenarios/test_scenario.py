@@ -171,9 +171,9 @@ def test_settings_reach_the_kernels_in_their_units():
     }
     scenario = parse_scenario(values, "test")
     setting = make_setting(scenario, make_setup(scenario), threads=2)
-    assert setting.noise.bearing_sigma == pytest.approx(np.pi / 60)
-    assert setting.noise.compass_sigma == pytest.approx(np.pi / 30)
-    assert (setting.noise.range_sigma, setting.noise.dropout) == (0.05, 0.1)
+    assert setting.noise.bearing_rad == pytest.approx(np.pi / 60)
+    assert setting.noise.compass_rad == pytest.approx(np.pi / 30)
+    assert (setting.noise.range_fraction, setting.noise.dropout) == (0.05, 0.1)
     assert (setting.radio.loss, setting.radio.latency_s, setting.radio.range_m) == (0.2, 0.3, 7.0)
     assert (setting.dt, setting.limit_s, setting.seed, setting.threads) == (0.1, 12.0, 9, 2)
     rig = make_rig_of(scenario)

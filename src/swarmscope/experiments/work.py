@@ -25,7 +25,7 @@ from swarmscope.scenarios.to_kernels import planner_of
 
 MEASURED = ("plan_us_p50", "plan_us_p99", "run_wall_s", "reference_s")
 """Figures that are times of this machine: stored, but no part of the digest."""
-NO_RESULT = frozenset({"cli", "viewing", "experiments"})
+NO_RESULT = frozenset({"api.py", "cli", "viewing", "experiments"})
 LENGTHS = ("shortest_m", "any_angle_m")
 PLACE_KEYS = ("task", "map", "place", "robots", "seed")
 

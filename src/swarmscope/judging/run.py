@@ -53,6 +53,19 @@ class References(NamedTuple):
     """How long they took to find (measured)."""
 
 
+class Contents(NamedTuple):
+    """What a run folder holds, but for its pictures."""
+
+    config: dict[str, Any]
+    """``config.yaml``: the complete scenario."""
+    world: dict[str, Any]
+    """``world.json``."""
+    trajectory: dict[str, np.ndarray]
+    """``trajectory.npz``."""
+    metrics: dict[str, Any]
+    """``metrics.json``."""
+
+
 @dataclass(frozen=True)
 class Outcome:
     """A finished run with its references."""
@@ -88,14 +101,19 @@ def play(
 
 def find_references(scenario: Scenario, setup: Setup, any_angle: bool = True) -> References:
     """Find the shortest ways of the scenario's robots."""
-    radius = scenario.robot.radius_m
+    return reference_ways(setup, scenario.robot.radius_m, any_angle)
+
+
+def reference_ways(setup: Setup, radius: float, any_angle: bool = True) -> References:
+    """Find the shortest ways of robots of ``radius`` [m]."""
+    robots = len(setup.starts)
     begun = time.perf_counter()
     chosen = _with_reference(setup)
     ways = grid_paths(setup.world, setup.starts[chosen], setup.goals[chosen], radius)
     wall_s = time.perf_counter() - begun
-    shortest, best = np.full((2, scenario.robots), np.nan)
+    shortest, best = np.full((2, robots), np.nan)
     shortest[chosen] = lengths_m(ways)
-    if any_angle and len(chosen) == scenario.robots <= ANY_ANGLE_ROBOTS:
+    if any_angle and len(chosen) == robots <= ANY_ANGLE_ROBOTS:
         best = lengths_m(any_angle_paths(setup.world, setup.starts, setup.goals, radius, ways))
     return References(shortest, best, wall_s)
 
@@ -117,10 +135,14 @@ def run_scenario(
 ) -> dict[str, Any]:
     """Run the scenario into the run folder ``out`` and return its metrics; ``extras`` adds pictures to it."""
     check_out(out)
-    outcome = play(scenario, threads, progress)
-    metrics = figures(outcome)
-    write_run(out, complete(scenario), world_table(outcome), trajectory(outcome), metrics, extras)
-    return metrics
+    found = contents(play(scenario, threads, progress))
+    write_run(out, *found, extras)
+    return found.metrics
+
+
+def contents(outcome: Outcome) -> Contents:
+    """Return what the run folder of a finished run holds."""
+    return Contents(complete(outcome.scenario), world_table(outcome), trajectory(outcome), figures(outcome))
 
 
 def figures(outcome: Outcome) -> dict[str, Any]:

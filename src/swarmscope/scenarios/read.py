@@ -66,9 +66,9 @@ def _find_beside(scenario: Path, name: str) -> str:
     return str(beside) if beside.exists() else name
 
 
-def load_scenario(path: Path) -> Scenario:
+def load_scenario(path: Path | str) -> Scenario:
     """Return the scenario in YAML file ``path``."""
-    return parse_scenario(read_scenario_file(path), str(path))
+    return parse_scenario(read_scenario_file(Path(path)), str(path))
 
 
 def _first_problem(error: ValidationError, where: str) -> ConfigError:

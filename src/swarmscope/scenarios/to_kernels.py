@@ -15,7 +15,7 @@ from swarmscope.onboard.planners import Planner, load_planner
 from swarmscope.onboard.rig import Guarding, Rig, Safety, Sharing, make_rig
 from swarmscope.onboard.sensor import Sensor
 from swarmscope.scenarios.read import is_packaged, map_path
-from swarmscope.scenarios.scenario import PlannerModel, Scenario
+from swarmscope.scenarios.scenario import NoiseModel, PlannerModel, Scenario
 from swarmscope.sim.lidar import make_beams
 from swarmscope.sim.loop import Setting
 from swarmscope.sim.maps import load_map
@@ -112,10 +112,19 @@ def _with_run_seed(params: Any, seed: int) -> Any:
     return params._replace(seed=int(np.random.SeedSequence([seed, int(params.seed)]).generate_state(1)[0]))
 
 
+def _noise_of(noise: NoiseModel) -> Noise:
+    """Return the errors in the units of the kernels."""
+    return Noise(
+        range_fraction=noise.range_fraction,
+        dropout=noise.dropout,
+        bearing_rad=math.radians(noise.bearing_deg),
+        compass_rad=math.radians(noise.compass_deg),
+    )
+
+
 def make_setting(scenario: Scenario, setup: Setup, threads: int = 1) -> Setting:
     """Return the run of ``scenario`` in ``setup``, ready for the kernels."""
     planner = planner_of(scenario.planner)
-    noise, radio = scenario.noise, scenario.radio
     ticks = scenario.limit_s * scenario.lidar.rate_hz
     heavy = ticks * scenario.robots * scenario.lidar.beams > 4e7
     return Setting(
@@ -127,16 +136,8 @@ def make_setting(scenario: Scenario, setup: Setup, threads: int = 1) -> Setting:
         rig=make_rig_of(scenario),
         planner=planner,
         params=_with_run_seed(planner.params(scenario.planner.params), scenario.seed),
-        noise=Noise(
-            range_sigma=noise.range_fraction,
-            dropout=noise.dropout,
-            position_range_sigma=noise.range_fraction,
-            bearing_sigma=math.radians(noise.bearing_deg),
-            compass_sigma=math.radians(noise.compass_deg),
-        ),
-        radio=Radio(
-            range_m=radio.range_m, latency_s=radio.latency_s, loss=radio.loss, bitrate=radio.bitrate_bps
-        ),
+        noise=_noise_of(scenario.noise),
+        radio=Radio(**scenario.radio.model_dump(exclude={"exact_features"})),
         seed=scenario.seed,
         dt=1.0 / scenario.lidar.rate_hz,
         substeps=scenario.substeps,

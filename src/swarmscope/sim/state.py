@@ -71,13 +71,15 @@ CHOICE = np.dtype(
 
 
 class Noise(NamedTuple):
-    """Sensor errors: fractions of the distance, radians, probabilities."""
+    """Sensor errors, one standard deviation each; 0 is none."""
 
-    range_sigma: float = 0.0
+    range_fraction: float = 0.0
+    """Of a LiDAR range and of the distance to a neighbour, as a fraction of it."""
     dropout: float = 0.0
-    position_range_sigma: float = 0.0
-    bearing_sigma: float = 0.0
-    compass_sigma: float = 0.0
+    """Share of LiDAR returns lost."""
+    bearing_rad: float = 0.0
+    """Of the bearing of a neighbour."""
+    compass_rad: float = 0.0
 
 
 class Radio(NamedTuple):
@@ -86,7 +88,7 @@ class Radio(NamedTuple):
     range_m: float = 15.0
     latency_s: float = 0.005
     loss: float = 0.0
-    bitrate: float = 78125.0
+    bitrate_bps: float = 78125.0
     overhead_bytes: int = 23
     """Preamble, header and checksum of the link layer per packet (IEEE 802.15.4: 6 + 15 + 2)."""
     max_wait_s: float = 0.5
