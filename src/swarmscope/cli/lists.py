@@ -9,6 +9,7 @@ from types import ModuleType
 
 from rich.table import Table
 
+from swarmscope.bounds import about
 from swarmscope.cli._console import PlainConsole
 from swarmscope.onboard.planners import load_planner, planner_names
 from swarmscope.scenarios.to_kernels import task_options
@@ -23,10 +24,10 @@ def list_planners() -> None:
         planner = load_planner(name)
         console.print(f"[bold]{name}[/bold]  {planner.summary.removeprefix(f'{name}: ')}")
         console.print(f"  is given: {planner.needs}", highlight=False)
-        table = Table("planner.params", "default", "bounds", "meaning")
+        table = Table("planner.params", "default", "takes", "meaning")
         docs = field_docs(planner.module, "Params")
-        for field, default in planner.defaults.items():
-            table.add_row(field, str(default), planner.bounds(field), docs.get(field, ""))
+        for field in planner.fields.values():
+            table.add_row(field.name, str(field.default), about(field), docs.get(field.name, ""))
         console.print(table)
 
 
