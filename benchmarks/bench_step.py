@@ -15,8 +15,9 @@ from swarmscope.onboard.perception.filters import filter_padded, prepare_scan
 from swarmscope.onboard.planning import nav_scope
 from swarmscope.onboard.planning._contract import make_params
 from swarmscope.onboard.sharing.message import encode_features
+from swarmscope.scenarios.places import make_setup
 from swarmscope.scenarios.read import parse_scenario
-from swarmscope.scenarios.to_kernels import make_rig_of, make_setup
+from swarmscope.scenarios.to_kernels import make_rig_of
 from swarmscope.sim.lidar import cast_static, make_beams
 from swarmscope.sim.world import compile_world
 

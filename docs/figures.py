@@ -12,8 +12,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.patches import Circle, Wedge
 
-from swarmscope.scenarios.read import parse_scenario
-from swarmscope.scenarios.to_kernels import make_rig_of, make_setup
+from swarmscope.onboard.body import Body, protection_model
 from swarmscope.onboard.percept import Rig
 from swarmscope.onboard.perception.areas import passable_distance
 from swarmscope.onboard.perception.features import extrema, reconstruct
@@ -26,7 +25,9 @@ from swarmscope.onboard.perception.filters import (
 )
 from swarmscope.onboard.perception.safety import safe_directions
 from swarmscope.onboard.planning.fields import interaction_force
-from swarmscope.onboard.body import Body, protection_model
+from swarmscope.scenarios.places import make_setup
+from swarmscope.scenarios.read import parse_scenario
+from swarmscope.scenarios.to_kernels import make_rig_of
 from swarmscope.sim.lidar import cast_static, make_beams
 from swarmscope.sim.world import compile_world
 

@@ -11,8 +11,9 @@ from giwt_models import make_model, write_card
 from swarmscope.errors import ConfigError, InputFileError
 from swarmscope.experiments.work import finished, make_job, unit_key, work, world_key
 from swarmscope.onboard.planning import giwt
+from swarmscope.scenarios.places import make_setup
 from swarmscope.scenarios.read import load_scenario, parse_scenario
-from swarmscope.scenarios.to_kernels import complete, make_setting, make_setup, planner_of
+from swarmscope.scenarios.to_kernels import complete, make_setting, planner_of
 
 T1 = {"task": {"name": "T1"}, "robots": 2, "limit_s": 2.0, "record_scans": "no"}
 

@@ -18,7 +18,8 @@ import numpy as np
 from swarmscope.errors import SwarmscopeError
 from swarmscope.judging.cases import find_cases
 from swarmscope.judging.provenance import PACKAGE, git_revision, installed_version, versions
-from swarmscope.judging.run import Outcome, References, figures, play
+from swarmscope.judging.references import References
+from swarmscope.judging.run import Outcome, figures, play
 from swarmscope.scenarios.read import parse_scenario
 from swarmscope.scenarios.scenario import PlannerModel, Scenario
 from swarmscope.scenarios.to_kernels import planner_of

@@ -10,8 +10,8 @@ from pydantic import ValidationError
 
 from swarmscope.errors import ConfigError, InputFileError, UnknownNameError, nearest_hint
 from swarmscope.onboard.planning._contract import load_planner, planner_names
+from swarmscope.scenarios.places import is_packaged
 from swarmscope.scenarios.scenario import Scenario
-from swarmscope.sim.maps import packaged_map
 from swarmscope.tasks._contract import task_names
 
 
@@ -92,13 +92,3 @@ def _valid_keys(loc: tuple[int | str, ...]) -> list[str]:
         options = [k for k in getattr(kind, "__args__", ()) if hasattr(k, "model_fields")]
         model = options[0] if options else kind
     return list(getattr(model, "model_fields", {}))
-
-
-def map_path(name: str) -> Path:
-    """Return the YAML file of a map: a path, or the name of a map that comes with the package."""
-    return packaged_map(name) if is_packaged(name) else Path(name)
-
-
-def is_packaged(name: str) -> bool:
-    """Tell whether this is the name of a map that comes with the package, not a path."""
-    return not name.endswith((".yaml", ".yml"))

@@ -3,45 +3,23 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, is_dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from swarmscope.errors import ConfigError
 from swarmscope.onboard.body import Body
 from swarmscope.onboard.percept import Rig, Sensor, make_rig
 from swarmscope.onboard.planning._contract import load_planner, make_params
-from swarmscope.scenarios.read import is_packaged, map_path
+from swarmscope.scenarios.places import is_packaged
 from swarmscope.scenarios.scenario import PlannerModel, Scenario
 from swarmscope.sim.lidar import make_beams
 from swarmscope.sim.loop import Setting
-from swarmscope.sim.maps import load_map
 from swarmscope.sim.state import Noise, Radio
-from swarmscope.sim.world import WorldSpec, compile_world
-from swarmscope.tasks._contract import Option, Setup, load_task
-
-
-def make_setup(scenario: Scenario) -> Setup:
-    """Return world, starts and goals of the scenario, checked to be solvable."""
-    radius = scenario.robot.radius_m
-    if scenario.task is not None:
-        task = load_task(scenario.task.name)
-        return task.make(scenario.seed, scenario.robots, radius, **scenario.task.options)
-    if scenario.map is not None:
-        from swarmscope.tasks import place_on_map
-
-        spec = map_world(map_path(scenario.map.file))
-        return place_on_map(spec, scenario.seed, scenario.robots, radius, scenario.map.min_distance_m)
-    place = scenario.place
-    if place is None or len(place.starts) != scenario.robots or len(place.goals) != scenario.robots:
-        raise ConfigError("place", f"needs as many starts and goals as robots ({scenario.robots})")
-    from swarmscope.tasks import check_setup
-
-    setup = Setup(place.world, np.array(place.starts, float), np.array(place.goals, float))
-    check_setup(setup, radius)
-    return setup
+from swarmscope.sim.world import compile_world
+from swarmscope.tasks import Setup, load_task
+from swarmscope.tasks._contract import all_options
+from swarmscope.user_files import is_file_name
 
 
 def complete(scenario: Scenario) -> dict[str, Any]:
@@ -50,27 +28,14 @@ def complete(scenario: Scenario) -> dict[str, Any]:
     values = scenario.model_dump(mode="json", exclude_none=True)
     values["planner"]["params"] = make_params(planner, scenario.planner.params)._asdict()
     if scenario.task is not None:
-        values["task"]["options"] = task_options(load_task(scenario.task.name)) | scenario.task.options
+        values["task"]["options"] = all_options(load_task(scenario.task.name), scenario.task.options)
+        if is_file_name(scenario.task.name):
+            values["task"]["name"] = str(Path(scenario.task.name).resolve())
     if scenario.planner.model is not None:
         values["planner"]["model"] = str(Path(scenario.planner.model).resolve())
     if scenario.map is not None and not is_packaged(scenario.map.file):
         values["map"]["file"] = str(Path(scenario.map.file).resolve())
     return values
-
-
-def task_options(task: Any) -> dict[str, Option]:
-    """Return the options of a task module with their defaults: the fields of its ``...Options`` dataclass."""
-    kinds: list[Any] = [k for name, k in vars(task).items() if name.endswith("Options") and is_dataclass(k)]
-    values = [item for kind in kinds for item in asdict(kind()).items()]
-    return {name: value if isinstance(value, str) else float(value) for name, value in values}
-
-
-def map_world(path: Path) -> WorldSpec:
-    """Return the world of a map_server map."""
-    grid = load_map(path)
-    x, y = grid.origin
-    bounds = (x, y, x + grid.width * grid.resolution, y + grid.height * grid.resolution)
-    return WorldSpec(obstacles=[grid], bounds=bounds)
 
 
 def make_rig_of(scenario: Scenario) -> Rig:
