@@ -49,7 +49,7 @@ def costs(planner: str, seed: int) -> dict[str, float]:
         "any_angle_m": references.any_angle_m.tolist(),
         "wall_s": 0.0,
     }
-    job = make_job(unit_key(config), world_key(scenario), config, known)
+    job = make_job(unit_key(scenario), world_key(scenario), config, known)
     times.append(time.perf_counter())
     work(job)
     whole = time.perf_counter() - times[-1]

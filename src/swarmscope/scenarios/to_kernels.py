@@ -22,17 +22,22 @@ from swarmscope.tasks._contract import all_options
 from swarmscope.user_files import is_file_name
 
 
-def complete(scenario: Scenario) -> dict[str, Any]:
-    """Return the scenario as plain values, every default written out; ``parse_scenario`` reads it back."""
-    planner = load_planner(scenario.planner.name)
+def complete(scenario: Scenario, run_files: bool = True) -> dict[str, Any]:
+    """Return the scenario as plain values, every default written out; ``parse_scenario`` reads it back.
+
+    Unless ``run_files``, defaults that only running a user's file would tell are left out.
+    """
     values = scenario.model_dump(mode="json", exclude_none=True)
-    values["planner"]["params"] = make_params(planner, scenario.planner.params)._asdict()
-    if scenario.task is not None:
-        values["task"]["options"] = all_options(load_task(scenario.task.name), scenario.task.options)
-        if is_file_name(scenario.task.name):
-            values["task"]["name"] = str(Path(scenario.task.name).resolve())
-    if scenario.planner.model is not None:
-        values["planner"]["model"] = str(Path(scenario.planner.model).resolve())
+    planner, task = scenario.planner, scenario.task
+    if run_files or not is_file_name(planner.name):
+        values["planner"]["params"] = make_params(load_planner(planner.name), planner.params)._asdict()
+    if task is not None and (run_files or not is_file_name(task.name)):
+        values["task"]["options"] = all_options(load_task(task.name), task.options)
+    for group in ("planner", "task"):
+        if group in values and is_file_name(values[group]["name"]):
+            values[group]["name"] = str(Path(values[group]["name"]).resolve())
+    if planner.model is not None:
+        values["planner"]["model"] = str(Path(planner.model).resolve())
     if scenario.map is not None and not is_packaged(scenario.map.file):
         values["map"]["file"] = str(Path(scenario.map.file).resolve())
     return values

@@ -7,7 +7,7 @@ from swarmscope.bounds import Bounds
 from swarmscope.errors import UnsolvableWorldError
 from swarmscope.sim.world import Circle, Polygon, Wall, WorldSpec
 from swarmscope.tasks._check import check_setup
-from swarmscope.tasks._contract import Setup, Task, load_task, task_names
+from swarmscope.tasks._contract import Setup, Task, load_task, task_file, task_names
 from swarmscope.tasks._made import setup_of_task
 from swarmscope.tasks._on_map import place_on_map
 
@@ -24,5 +24,6 @@ __all__ = [
     "load_task",
     "place_on_map",
     "setup_of_task",
+    "task_file",
     "task_names",
 ]

@@ -8,12 +8,13 @@ A planner is one file of this folder that defines ``NAME``,
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from swarmscope import members
 from swarmscope.errors import UnknownNameError
+from swarmscope.members import Kind, text
 
 STATE_NAMES = ("advance", "decide", "follow", "yield", "arrived", "escape", "crashed")
 ADVANCE, DECIDE, FOLLOW, YIELD, ARRIVED, ESCAPE, CRASHED = range(7)
@@ -52,28 +53,38 @@ REASON_NAMES = (
 ) = range(14)
 
 
-def planner_names() -> list[str]:
-    """Return the names of all planners in this folder."""
-    import swarmscope.onboard.planning as folder
-
-    files = (m.name for m in pkgutil.iter_modules(folder.__path__))
-    return sorted(str(_load(f).NAME) for f in files if f not in NOT_PLANNERS and not f.startswith("_"))
-
-
 NOT_PLANNERS = frozenset({"fields", "fusion"})
 """Modules of this folder that planners share."""
+PLANNERS = Kind(
+    "planner",
+    "swarmscope.onboard.planning",
+    "swarmscope.planners",
+    needs=(text("NAME"), text("SUMMARY"), text("NEEDS")),
+    leave_out=NOT_PLANNERS,
+)
+
+
+def planner_names() -> list[str]:
+    """Return the names of all planners that are installed."""
+    return members.names_of(PLANNERS)
+
+
+def planner_file(name: str) -> Path:
+    """Return the file of a planner without importing it."""
+    return members.find(PLANNERS, name).file
 
 
 def load_planner(name: str) -> ModuleType:
-    """Return the module of planner ``name``; raises UnknownNameError with the nearest name."""
-    file = name.replace("-", "_")
-    if file.isidentifier() and name == file.replace("_", "-") and file not in NOT_PLANNERS and file[0] != "_":
-        try:
-            return _load(file)
-        except ModuleNotFoundError as error:
-            if error.name != f"swarmscope.onboard.planning.{file}":
-                raise
-    raise UnknownNameError("planner", name, planner_names())
+    """Return the module of planner ``name``, or of a user's FILE.py; UnknownNameError names the nearest.
+
+    Its ``Params`` is named after its file: Numba tells named tuples apart by class name and types of the fields only,
+    so two planners' ``Params`` with equally many floats would be one type, and every call of the one loaded later
+    would take a detour of 0.7 ms.
+    """
+    module = members.load(PLANNERS, name)
+    kind = module.Params
+    kind.__name__ = f"Params_{kind.__module__.rpartition('.')[2]}"
+    return module
 
 
 def make_params(planner: Any, values: dict[str, Any]) -> Any:
@@ -83,15 +94,3 @@ def make_params(planner: Any, values: dict[str, Any]) -> Any:
         if key not in fields:
             raise UnknownNameError("parameter", key, fields, f"planner '{planner.NAME}'")
     return planner.Params(**{k: type(v)(values.get(k, v)) for k, v in fields.items()})
-
-
-def _load(file: str) -> ModuleType:
-    """Import a planner and name its ``Params`` after its file.
-
-    Numba tells named tuples apart by class name and types of the fields only: two planners' ``Params`` with equally
-    many floats would be one type, and every call of the one loaded later would take a detour of 0.7 ms.
-    """
-    module = importlib.import_module(f"swarmscope.onboard.planning.{file}")
-    kind = module.Params
-    kind.__name__ = f"Params_{kind.__module__.rpartition('.')[2]}"
-    return module
