@@ -13,10 +13,10 @@ import numpy as np
 
 from swarmscope.errors import SwarmscopeError
 from swarmscope.experiments.work import make_job, unit_key, work, world_key
-from swarmscope.judging.references import find_references
+from swarmscope.judging.references import reference_ways
 from swarmscope.judging.run import play
 from swarmscope.judging.sides import make_advice
-from swarmscope.onboard.planning._contract import load_planner, planner_names
+from swarmscope.onboard.planners import load_planner, planner_names
 from swarmscope.scenarios.places import make_setup
 from swarmscope.scenarios.read import parse_scenario
 from swarmscope.scenarios.to_kernels import complete
@@ -37,9 +37,9 @@ def costs(planner: str, seed: int) -> dict[str, float]:
     times = [time.perf_counter()]
     setup = make_setup(scenario)
     times.append(time.perf_counter())
-    references = find_references(setup, scenario.robot.radius_m)
+    references = reference_ways(setup, scenario.robot.radius_m)
     times.append(time.perf_counter())
-    if getattr(load_planner(planner), "TOLD_SIDE", False):
+    if load_planner(planner).told:
         make_advice(setup, scenario.robot.radius_m + scenario.safety.margin_m)
     times.append(time.perf_counter())
     run_s = play(scenario, references=references).trace.wall_s
@@ -79,7 +79,7 @@ def main() -> None:
     print("a million units on 1, 16, 1000 cores")
     for planner in planner_names():
         try:
-            getattr(load_planner(planner), "check_available", lambda: None)()
+            load_planner(planner).check_available()
         except SwarmscopeError as error:
             print(f"{planner:10s} left out: {error}")
             continue

@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 from rich.progress import track
 
-from swarmscope.cli.run import set_key
 from swarmscope.judging.provenance import git_revision, versions
 from swarmscope.judging.run import figures, play
 from swarmscope.judging.statistics import bootstrap_mean, paired_difference, wilson
+from swarmscope.scenarios.overrides import set_key
 from swarmscope.scenarios.read import parse_scenario
 from swarmscope.sim.maps import packaged_map
 from swarmscope.tasks import task_names

@@ -40,17 +40,17 @@ def kernel_folder() -> Path:
     return Path(os.environ.get("SWARMSCOPE_CACHE") or user) / "kernels"
 
 
-def cache_folder(file: Path, folder: Path | None = None) -> Path | None:
-    """Return the folder for the kernels of one file in its present state; None if there cannot be one.
+def cache_folder(file: Path, state: str) -> Path | None:
+    """Return the folder for the kernels of one file in one state; None if there cannot be one.
 
     Numba compiles a cached kernel anew when its own file has changed, but not when a function that it calls from
     another file does; a folder for each state of everything that the file imports (see ``closure``) rules out results
     of mixed versions, and leaves alone what does not import a file that was edited.
     """
     try:
-        return _made(file, closure_state(file, folder)[:16])
+        return _made(file, state)
     except (OSError, RuntimeError):
-        return None  # no home, no room, or no such file: Numba finds a place of its own
+        return None  # no home, or no room: Numba finds a place of its own
 
 
 @cache
@@ -119,10 +119,10 @@ warnings.filterwarnings("ignore", "Record.*has been considered a subtype", numba
 
 
 def jit_for(function: F, file: Path | None = None, options: dict[str, Any] = LEAN) -> F:
-    """Compile ``function``; its cached code is valid as long as nothing changes in what ``file`` imports.
+    """Compile ``function``; its cached code is valid as long as nothing changes in what its file imports.
 
-    ``file`` is the one that holds the function unless told otherwise: a loop that is made from one file's code with
-    the functions of another one depends on the other.
+    With ``file``, what that one imports counts, too: a loop that is made from one file's code with functions of
+    another one depends on both.
     """
     njit: Any = numba.njit
     with _cached_in(_cache_of(function, file)):
@@ -133,11 +133,15 @@ def _cache_of(function: Callable[..., Any], file: Path | None) -> Path | None:
     config: Any = numba.config
     if config.DISABLE_JIT:
         return None
-    place = Path(os.path.realpath(file or function.__code__.co_filename))
+    own = Path(os.path.realpath(function.__code__.co_filename))
+    place = own if file is None else Path(os.path.realpath(file))
     package = function.__module__.partition(".")[0]
-    if file is None and package.startswith(OF_A_USER):
-        return cache_folder(place, Path(sys.modules[package].__path__[0]))
-    return cache_folder(place)
+    folder = Path(sys.modules[package].__path__[0]) if package.startswith(OF_A_USER) else None
+    try:
+        states = [closure_state(one, folder) for one in dict.fromkeys((place, own))]
+    except OSError:
+        return None  # made from text: there is no such file
+    return cache_folder(place, hashlib.sha256("".join(states).encode()).hexdigest()[:16])
 
 
 def jit(function: F) -> F:
@@ -164,3 +168,8 @@ def jit_inner(function: F) -> F:
 def jit_alloc(function: F) -> F:
     """Compile ``function`` in nopython mode, cached on disk; it may allocate (set-up and evaluation only)."""
     return jit_for(function, options=OPTIONS)
+
+
+def jit_paste(function: F) -> F:
+    """Paste ``function`` into its callers before they are typed; for what returns views of arrays of records."""
+    return jit_for(function, options=LEAN | {"inline": "always"})

@@ -1,8 +1,8 @@
 """What can be set and within which bounds: parameters of planners, options of tasks.
 
 They are the fields of a NamedTuple or a dataclass with defaults, or the keyword parameters of a function. A number may
-carry bounds and a unit: ``gain: Annotated[float, Bounds(0.0, 10.0, "1/s")] = 1.0``. Without them any finite number is
-taken; a ``Literal`` takes its words.
+carry bounds and a unit: ``gain: Annotated[float, Bounds(0.0, 10.0, "1/s")] = 1.0``, or ``width: Metres = 1.2``. Without
+them any finite number is taken; a ``Literal`` takes its words.
 """
 
 from __future__ import annotations
@@ -26,6 +26,17 @@ class Bounds(NamedTuple):
     low: float = -math.inf
     high: float = math.inf
     unit: str = ""
+
+
+Metres = Annotated[float, Bounds(0.0, 1000.0, "m")]
+Seconds = Annotated[float, Bounds(0.0, 100_000.0, "s")]
+Speed = Annotated[float, Bounds(0.0, 100.0, "m/s")]
+Radians = Annotated[float, Bounds(0.0, 2.0 * math.pi, "rad")]
+Degrees = Annotated[float, Bounds(0.0, 360.0, "deg")]
+Weight = Annotated[float, Bounds(0.0, 1000.0)]
+Share = Annotated[float, Bounds(0.0, 1.0)]
+Flag = Annotated[int, Bounds(0, 1)]
+Seed = Annotated[int, Bounds(0, 2**31 - 1)]
 
 
 class Field(NamedTuple):

@@ -52,6 +52,14 @@ class MissingExtraError(SwarmscopeError):
         super().__init__(f"{feature} needs an optional part: pip install 'swarmscope[{extra}]'")
 
 
+class MissingPackageError(SwarmscopeError):
+    """A package of others that one function needs and that is not installed."""
+
+    def __init__(self, feature: str, package: str) -> None:
+        self.feature, self.package = feature, package
+        super().__init__(f"{feature} needs {package}: pip install {package}")
+
+
 class UnsolvableWorldError(SwarmscopeError):
     """A world in which a robot has no way from its start to its goal, or cannot stand where it is put."""
 

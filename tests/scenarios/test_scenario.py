@@ -125,7 +125,7 @@ def test_a_complete_scenario_survives_yaml_and_says_everything(values):
 
 
 def make_setting_params(scenario):
-    from swarmscope.onboard.planning._contract import load_planner
+    from swarmscope.onboard.planners import load_planner
 
     return load_planner(scenario.planner.name).Params._fields
 
@@ -173,9 +173,9 @@ def test_settings_reach_the_kernels_in_their_units():
     }
     scenario = parse_scenario(values, "test")
     setting = make_setting(scenario, make_setup(scenario), threads=2)
-    assert setting.noise.bearing_sigma == pytest.approx(np.pi / 60)
-    assert setting.noise.compass_sigma == pytest.approx(np.pi / 30)
-    assert (setting.noise.range_sigma, setting.noise.dropout) == (0.05, 0.1)
+    assert setting.noise.bearing_rad == pytest.approx(np.pi / 60)
+    assert setting.noise.compass_rad == pytest.approx(np.pi / 30)
+    assert (setting.noise.range_fraction, setting.noise.dropout) == (0.05, 0.1)
     assert (setting.radio.loss, setting.radio.latency_s, setting.radio.range_m) == (0.2, 0.3, 7.0)
     assert (setting.dt, setting.limit_s, setting.seed, setting.threads) == (0.1, 12.0, 9, 2)
     rig = make_rig_of(scenario)

@@ -117,7 +117,7 @@ def test_addresses_that_nobody_has_are_ignored(to):
 def test_the_given_share_is_lost_and_the_same_for_the_same_seed(loss):
     totals = []
     for _ in range(2):
-        sim = line(2, loss=loss, bitrate=1e9)
+        sim = line(2, loss=loss, bitrate_bps=1e9)
         lost = []
         for tick in range(1500):
             post(sim, 0, (1, REQUEST), (1, FEATURES))
@@ -132,7 +132,7 @@ def test_the_given_share_is_lost_and_the_same_for_the_same_seed(loss):
 
 def test_packets_of_one_tick_share_the_channel():
     """At 8 kbit/s and 30 bytes on the air a packet takes 30 ms: five last 150 ms, in their order."""
-    sim = line(2, bitrate=8000.0, overhead_bytes=23, latency_s=0.0)
+    sim = line(2, bitrate_bps=8000.0, overhead_bytes=23, latency_s=0.0)
     post(sim, 0, *[(1, REQUEST)] * 5)
     exchange(sim, 0)
     assert sim.queue_due[1, :5] == pytest.approx(0.03 * np.arange(1, 6))
@@ -140,7 +140,7 @@ def test_packets_of_one_tick_share_the_channel():
 
 
 def test_a_receiver_that_listens_to_one_keeps_the_other_waiting():
-    sim = line(3, bitrate=8000.0, overhead_bytes=23, latency_s=0.0)
+    sim = line(3, bitrate_bps=8000.0, overhead_bytes=23, latency_s=0.0)
     post(sim, 0, (2, REQUEST))
     post(sim, 1, (2, REQUEST))
     exchange(sim, 0)
@@ -148,7 +148,7 @@ def test_a_receiver_that_listens_to_one_keeps_the_other_waiting():
 
 
 def test_a_packet_that_would_wait_too_long_is_dropped_and_counted():
-    sim = line(2, bitrate=800.0, overhead_bytes=23, max_wait_s=0.5)
+    sim = line(2, bitrate_bps=800.0, overhead_bytes=23, max_wait_s=0.5)
     post(sim, 0, *[(1, REQUEST)] * 5)  # 0.3 s each
     exchange(sim, 0)
     assert counters(sim, 0, "sent", "crowded") == [2, 3]
@@ -156,7 +156,7 @@ def test_a_packet_that_would_wait_too_long_is_dropped_and_counted():
 
 
 def test_a_full_queue_takes_no_more_and_stays_whole():
-    sim = line(8, latency_s=100.0, bitrate=1e9)
+    sim = line(8, latency_s=100.0, bitrate_bps=1e9)
     for tick in range(2):
         for i in range(1, 8):
             post(sim, i, *[(0, REQUEST)] * 8)
@@ -168,7 +168,7 @@ def test_a_full_queue_takes_no_more_and_stays_whole():
 
 
 def test_the_channel_is_free_again_later():
-    sim = line(2, bitrate=8000.0, latency_s=0.0)
+    sim = line(2, bitrate_bps=8000.0, latency_s=0.0)
     for tick in range(3):
         post(sim, 0, (1, REQUEST))
         exchange(sim, 10 * tick)

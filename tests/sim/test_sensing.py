@@ -15,9 +15,7 @@ from swarmscope.sim.cells import index_robots
 from swarmscope.sim.sensing import sense
 from swarmscope.sim.state import Noise
 
-NOISE = Noise(
-    range_sigma=0.02, dropout=0.05, position_range_sigma=0.02, bearing_sigma=0.02, compass_sigma=0.05
-)
+NOISE = Noise(range_fraction=0.02, dropout=0.05, bearing_rad=0.02, compass_rad=0.05)
 
 
 def sensed(starts, tick=3, **options):
@@ -163,7 +161,7 @@ def test_noise_does_not_depend_on_the_order_in_which_robots_are_sensed():
 
 def test_noise_has_the_size_that_is_asked_for():
     starts = [(0.0, 0.0, 0.0), (2.0, 0.0, 0.0)]
-    sim, _, _ = place_sim(starts, noise=Noise(0.02, 0.0, 0.03, 0.04, 0.05))
+    sim, _, _ = place_sim(starts, noise=Noise(0.03, 0.0, 0.04, 0.05))
     index_robots(sim)
     rows = []
     for tick in range(2000):
@@ -175,12 +173,12 @@ def test_noise_has_the_size_that_is_asked_for():
         )
     rows = np.array(rows)
     assert rows.mean(axis=0) == pytest.approx([1.85, 2.0, 0.0, 0.0], abs=0.01)
-    assert rows.std(axis=0) == pytest.approx([0.02 * 1.85, 0.06, 0.04, 0.05], rel=0.08)
+    assert rows.std(axis=0) == pytest.approx([0.03 * 1.85, 0.06, 0.04, 0.05], rel=0.08)
 
 
 def test_compass_errors_turn_the_goal_but_not_the_scan():
     clean = sensed([(0.0, 0.0, 0.0)], goals=[(3.0, 0.0)])
-    wrong = sensed([(0.0, 0.0, 0.0)], goals=[(3.0, 0.0)], noise=Noise(compass_sigma=0.1))
+    wrong = sensed([(0.0, 0.0, 0.0)], goals=[(3.0, 0.0)], noise=Noise(compass_rad=0.1))
     error = float(wrong.percepts[0]["compass"])
     assert error != 0.0
     assert float(wrong.percepts[0]["goal_bearing"]) == pytest.approx(-error)

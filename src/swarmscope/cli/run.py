@@ -3,26 +3,24 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from swarmscope.api import add_pictures
 from swarmscope.cli._console import PlainConsole
 from swarmscope.errors import ConfigError
 from swarmscope.experiments.warm_up import kernels_are_cold
 from swarmscope.judging.run import place_name, run_scenario
 from swarmscope.judging.run_folder import check_out
+from swarmscope.scenarios.overrides import PLACES, choose, set_key
 from swarmscope.scenarios.read import parse_scenario, read_scenario_file
 from swarmscope.scenarios.scenario import Scenario
+from swarmscope.viewing.progress import progress_bar
 
-PLACES = ("task", "map", "place")
 MOST_FAILURES = 10
 ROWS = (
     ("arrival_rate", "arrived", "{:.1%}"),
@@ -69,37 +67,6 @@ def run_command(
         print(place / name)
 
 
-@contextmanager
-def progress_bar(scenario: Scenario) -> Iterator[Callable[[float, int], None]]:
-    """Show the simulated time and the robots that are done while the body runs and calls what it is given."""
-    words = TextColumn("{task.fields[note]}")
-    with Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        words,
-        TimeElapsedColumn(),
-        console=Console(stderr=True),
-        transient=True,
-    ) as bar:
-        name = f"{place_name(scenario)} {scenario.planner.name}"
-        job = bar.add_task(name, total=scenario.limit_s, note="")
-
-        def progress(simulated: float, done: int) -> None:
-            note = f"{simulated:.0f} s of {scenario.limit_s:.0f} s, {done} of {scenario.robots} robots done"
-            bar.update(job, completed=simulated, note=note)
-
-        yield progress
-
-
-def add_pictures(folder: Path) -> None:
-    """Add the picture and the replay page to a run folder."""
-    from swarmscope.viewing.pictures import write_picture
-    from swarmscope.viewing.replay import write_replay
-
-    write_picture(folder)
-    write_replay(folder)
-
-
 def print_metrics(console: Console, metrics: dict[str, Any]) -> None:
     """Print the key figures as a table."""
     about = metrics["run"]
@@ -135,11 +102,11 @@ def read_options(
     if task is not None and map_ is not None:
         raise ConfigError("--task and --map", "give one of them")
     if task is not None:
-        _choose(values, "task", "name", task)
+        choose(values, "task", "name", task)
     if map_ is not None:
-        _choose(values, "map", "file", map_)
+        choose(values, "map", "file", map_)
     if planner is not None:
-        _choose(values, "planner", "name", planner)
+        choose(values, "planner", "name", planner)
     values |= {key: value for key, value in options.items() if value is not None}
     named = {change.replace("=", ".").partition(".")[0] for change in changes}
     if not any(key in values for key in PLACES) and not named & {"map", "place"}:
@@ -147,40 +114,3 @@ def read_options(
     for change in changes:
         set_key(values, change)
     return parse_scenario(values, str(file) if file is not None else "command line")
-
-
-def _choose(values: dict[str, Any], group: str, key: str, value: str) -> None:
-    """Set ``group.key``; the group's other keys stay if they were written for the same value."""
-    if group in PLACES:
-        for other in PLACES:
-            if other != group:
-                values.pop(other, None)
-    given = values.get(group)
-    same = isinstance(given, dict) and given.get(key) == value
-    values[group] = given if same else {key: value}
-
-
-def set_key(values: dict[str, Any], change: str) -> None:
-    """Apply one ``key.path=value`` to the nested mapping."""
-    path, equals, text = change.partition("=")
-    if not equals or not all(path.split(".")):
-        raise ConfigError(f"--set {change}", "must look like key.path=value")
-    at: Any = values
-    *parents, last = path.split(".")
-    for part in parents:
-        at = at.setdefault(part, {})
-        if not isinstance(at, dict):
-            raise ConfigError(f"--set {change}", f"'{part}' is not a group of keys")
-    at[last] = _value(text, change)
-
-
-def _value(text: str, change: str) -> Any:
-    """Return ``text`` as YAML reads it; 1e-3, which YAML 1.1 takes for text, is a number."""
-    try:
-        value = yaml.safe_load(text)
-    except yaml.YAMLError:
-        raise ConfigError(f"--set {change}", "the value is not valid YAML") from None
-    if isinstance(value, str):
-        with suppress(ValueError):
-            return float(value)
-    return value

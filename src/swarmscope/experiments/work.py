@@ -25,7 +25,7 @@ from swarmscope.judging.cases import find_cases
 from swarmscope.judging.provenance import git_revision, installed_version, library_version, versions
 from swarmscope.judging.references import References
 from swarmscope.judging.run import Outcome, figures, play
-from swarmscope.onboard.planning._contract import planner_file
+from swarmscope.onboard.planners import planner_file
 from swarmscope.scenarios import places
 from swarmscope.scenarios.read import parse_scenario
 from swarmscope.scenarios.scenario import PlannerModel, Scenario
@@ -95,9 +95,8 @@ def revision() -> str:
 
 def model_state(config: dict[str, Any]) -> str | None:
     """Return which network the scenario's planner runs, and by which version of what; None without one."""
-    planner = planner_of(PlannerModel.model_validate(config.get("planner", {})))
-    state = getattr(planner, "model_state", None)
-    return None if state is None else f"{state()} onnxruntime {installed_version('onnxruntime')}"
+    model = planner_of(PlannerModel.model_validate(config.get("planner", {}))).model
+    return None if model is None else f"{model.state()} onnxruntime {installed_version('onnxruntime')}"
 
 
 def unit_key(scenario: Scenario) -> str:

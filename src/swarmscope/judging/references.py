@@ -27,7 +27,7 @@ class References(NamedTuple):
     """How long they took to find (measured)."""
 
 
-def find_references(setup: Setup, radius: float, any_angle: bool = True) -> References:
+def reference_ways(setup: Setup, radius: float, any_angle: bool = True) -> References:
     """Find the shortest ways of robots of ``radius`` [m]."""
     robots = len(setup.starts)
     begun = time.perf_counter()

@@ -7,7 +7,7 @@ import json
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -22,10 +22,11 @@ from swarmscope.judging.metrics import (
     sides_judged,
 )
 from swarmscope.judging.provenance import git_revision, versions
-from swarmscope.judging.references import References, find_references
+from swarmscope.judging.references import References, reference_ways
 from swarmscope.judging.run_folder import check_out, write_run
 from swarmscope.judging.sides import judged_by, make_advice
-from swarmscope.onboard.planning._contract import REASON_NAMES, STATE_NAMES
+from swarmscope.onboard.planners import Planner
+from swarmscope.onboard.reasons import STATE_NAMES
 from swarmscope.scenarios.places import make_setup
 from swarmscope.scenarios.scenario import Scenario
 from swarmscope.scenarios.to_kernels import complete, make_setting
@@ -35,6 +36,19 @@ from swarmscope.tasks import Setup
 ARRIVE_M = 0.05
 """Distance to the goal at which robots have arrived whose planner has no parameter ``arrive_m``."""
 KILO = 1000.0
+
+
+class Contents(NamedTuple):
+    """What a run folder holds, but for its pictures."""
+
+    config: dict[str, Any]
+    """``config.yaml``: the complete scenario."""
+    world: dict[str, Any]
+    """``world.json``."""
+    trajectory: dict[str, np.ndarray]
+    """``trajectory.npz``."""
+    metrics: dict[str, Any]
+    """``metrics.json``."""
 
 
 @dataclass(frozen=True)
@@ -58,15 +72,15 @@ def play(
     """Run the scenario and find the reference ways; ``progress(simulated seconds, robots done)``.
 
     ``references`` of the same world are taken as they are. The side of the shortest way is found for planners that
-    declare ``TOLD_SIDE``, and where the scenario says ``judge_sides``: then it is noted beside every choice.
+    are oracles, and where the scenario says ``judge_sides``: then it is noted beside every choice.
     """
     setup = make_setup(scenario)
     setting = make_setting(scenario, setup, threads)
-    if scenario.judge_sides or getattr(setting.planner, "TOLD_SIDE", False):
+    if scenario.judge_sides or setting.planner.told:
         setting = replace(setting, advice=make_advice(setup, *judged_by(scenario, setting.rig)))
     trace = run(setting, progress)
     if references is None:
-        references = find_references(setup, scenario.robot.radius_m, any_angle)
+        references = reference_ways(setup, scenario.robot.radius_m, any_angle)
     return Outcome(scenario, setup, setting, trace, references)
 
 
@@ -79,10 +93,14 @@ def run_scenario(
 ) -> dict[str, Any]:
     """Run the scenario into the run folder ``out`` and return its metrics; ``extras`` adds pictures to it."""
     check_out(out)
-    outcome = play(scenario, threads, progress)
-    metrics = figures(outcome)
-    write_run(out, complete(scenario), world_table(outcome), trajectory(outcome), metrics, extras)
-    return metrics
+    found = contents(play(scenario, threads, progress))
+    write_run(out, *found, extras)
+    return found.metrics
+
+
+def contents(outcome: Outcome) -> Contents:
+    """Return what the run folder of a finished run holds."""
+    return Contents(complete(outcome.scenario), world_table(outcome), trajectory(outcome), figures(outcome))
 
 
 def figures(outcome: Outcome) -> dict[str, Any]:
@@ -156,10 +174,9 @@ def figures(outcome: Outcome) -> dict[str, Any]:
     return values
 
 
-def _model(planner: Any) -> dict[str, str]:
+def _model(planner: Planner) -> dict[str, str]:
     """Return which network the planner runs, nothing without one."""
-    state = getattr(planner, "model_state", None)
-    return {} if state is None else {"model_sha256": state()}
+    return {} if planner.model is None else {"model_sha256": planner.model.state()}
 
 
 def place_name(scenario: Scenario) -> str:
@@ -171,10 +188,10 @@ def place_name(scenario: Scenario) -> str:
 
 def failures(outcome: Outcome) -> list[dict[str, Any]]:
     """Name each robot that did not arrive, and why."""
-    robots, records = outcome.trace.robots, outcome.trace.records
+    robots, records, reasons = outcome.trace.robots, outcome.trace.records, outcome.setting.planner.reasons
     found = []
     for i in np.flatnonzero(~np.isfinite(robots["arrival_s"])):
-        state, reason = STATE_NAMES[records.state[-1, i]], REASON_NAMES[records.reason[-1, i]]
+        state, reason = STATE_NAMES[records.state[-1, i]], reasons[records.reason[-1, i]]
         to_go = float(np.hypot(robots["goal_x"][i] - robots["x"][i], robots["goal_y"][i] - robots["y"][i]))
         late = f"time limit in state '{state}': {reason}; {to_go:.1f} m from its goal"
         why = "collided" if robots["crashed"][i] else late
@@ -212,7 +229,7 @@ def trajectory(outcome: Outcome) -> dict[str, np.ndarray]:
         "bytes_sent": records.bytes_sent,
         "neighbours": records.neighbours,
         "state_names": np.array(STATE_NAMES),
-        "reason_names": np.array(REASON_NAMES),
+        "reason_names": np.array(outcome.setting.planner.reasons),
         "beam_angles": angles,
         "scan_u8": records.scan,
         "safe_bits": records.safe,

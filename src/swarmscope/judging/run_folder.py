@@ -10,7 +10,6 @@ from __future__ import annotations
 import errno
 import fcntl
 import json
-import math
 import os
 import re
 import shutil
@@ -24,6 +23,7 @@ import numpy.typing as npt
 import yaml
 
 from swarmscope.errors import ConfigError, InputFileError, SwarmscopeError
+from swarmscope.scenarios.plain import plain
 from swarmscope.sim.scan_files import read_npz
 
 CONFIG, WORLD, TRAJECTORY, METRICS = "config.yaml", "world.json", "trajectory.npz", "metrics.json"
@@ -160,26 +160,11 @@ def _write_npz(path: Path, arrays: Mapping[str, npt.NDArray[Any]]) -> None:
 
 
 def _json_text(data: Mapping[str, Any]) -> str:
-    return json.dumps(_plain(data, finite=True), sort_keys=True, indent=1, allow_nan=False) + "\n"
+    return json.dumps(plain(data, finite=True), sort_keys=True, indent=1, allow_nan=False) + "\n"
 
 
 def _yaml_text(data: Mapping[str, Any]) -> str:
-    return yaml.safe_dump(_plain(data, finite=False), sort_keys=False, allow_unicode=True, explicit_end=True)
-
-
-def _plain(value: Any, *, finite: bool) -> Any:
-    """Return ``value`` in types that JSON and YAML know; with ``finite``, NaN and infinity become None."""
-    if isinstance(value, Mapping):
-        return {str(key): _plain(item, finite=finite) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(item, finite=finite) for item in value]
-    if isinstance(value, (np.ndarray, np.generic)):
-        return _plain(value.tolist(), finite=finite)
-    if isinstance(value, Path):
-        return str(value)
-    if finite and isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
+    return yaml.safe_dump(plain(data), sort_keys=False, allow_unicode=True, explicit_end=True)
 
 
 def _publish(partial: Path, place: Path) -> None:

@@ -9,7 +9,7 @@ import yaml
 from pydantic import ValidationError
 
 from swarmscope.errors import ConfigError, InputFileError, UnknownNameError, nearest_hint
-from swarmscope.onboard.planning._contract import load_planner, planner_names
+from swarmscope.onboard.planners import load_planner, planner_names
 from swarmscope.scenarios.places import is_packaged
 from swarmscope.scenarios.scenario import Scenario
 from swarmscope.tasks import task_names
@@ -27,7 +27,7 @@ def parse_scenario(values: Any, where: str) -> Scenario:
     if scenario.task is not None:
         _check_known("task", scenario.task.name, task_names(), where)
     _check_known("planner", scenario.planner.name, planner_names(), where)
-    if scenario.planner.model is not None and not hasattr(load_planner(scenario.planner.name), "with_model"):
+    if scenario.planner.model is not None and load_planner(scenario.planner.name).model is None:
         raise ConfigError(f"{where}: planner.model", f"planner '{scenario.planner.name}' runs no network")
     return scenario
 
@@ -83,9 +83,9 @@ def _find_beside(scenario: Path, name: str) -> str:
     return str(beside) if beside.exists() else name
 
 
-def load_scenario(path: Path) -> Scenario:
+def load_scenario(path: Path | str) -> Scenario:
     """Return the scenario in YAML file ``path``."""
-    return parse_scenario(read_scenario_file(path), str(path))
+    return parse_scenario(read_scenario_file(Path(path)), str(path))
 
 
 def _first_problem(error: ValidationError, where: str) -> ConfigError:

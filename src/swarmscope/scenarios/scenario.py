@@ -1,135 +1,199 @@
-"""The schema of a scenario: one file that describes one run completely, validated."""
+"""The schema of a scenario: one file that describes one run completely, validated.
+
+A default that the kernels have, too, is taken from there: ``Body``, ``Guarding``, ``Safety``, ``Sharing``, ``Noise``,
+``Radio``, ``Setting``.
+The text after a field is its meaning, with the unit in brackets; docs/scenario.md and ``swarmscope config`` print it.
+"""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+import math
+from typing import Annotated, Final, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from swarmscope.onboard.body import Body
+from swarmscope.onboard.rig import Guarding, Safety, Sharing
+from swarmscope.sim.loop import Setting
+from swarmscope.sim.state import Noise, Radio
 from swarmscope.sim.world import WorldSpec
 
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
 NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 
+BODY: Final = Body()
+NOISE: Final = Noise()
+RADIO: Final = Radio()
+GUARDING: Final = Guarding()
+SAFETY: Final = Safety()
+
 
 class _Strict(BaseModel):
     """No unknown keys, nothing changed after loading."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)
 
 
 class RobotModel(_Strict):
-    """The robots' data sheet (``Body``)."""
+    """The robots' data sheet: all robots of a run are alike."""
 
-    radius_m: Positive = 0.15
-    half_width_m: Positive = 0.15
-    v_max_mps: Positive = 0.5
-    a_max_mps2: Positive = 2.0
-    w_max_radps: Positive = 2.0
-    sensor_delay_s: NotNegative = 0.175
+    radius_m: Positive = BODY.radius_m
+    """Radius of the circle round the body [m]."""
+    half_width_m: Positive = BODY.half_width_m
+    """Half of the body's width across its direction of travel, r_0 [m]."""
+    v_max_mps: Positive = BODY.v_max_mps
+    """Highest speed [m/s]."""
+    a_max_mps2: Positive = BODY.a_max_mps2
+    """Largest acceleration, also when braking [m/s²]."""
+    w_max_radps: Positive = BODY.w_max_radps
+    """Highest turn rate [rad/s]."""
+    sensor_delay_s: NotNegative = BODY.sensor_delay_s
+    """From a return to the command that heeds it, t_d: it makes the safety margin r wider [s]."""
 
 
 class LidarModel(_Strict):
     """The LiDAR."""
 
     beams: Annotated[int, Field(ge=8, le=4096)] = 360
+    """Beams of a scan."""
     fov_deg: Annotated[float, Field(gt=0.0, le=360.0)] = 360.0
+    """Field of view, in the middle of which is straight ahead [°]."""
     range_m: Positive = 5.0
+    """Longest range; beyond it there is no return [m]."""
     range_min_m: NotNegative = 0.0
-    rate_hz: Annotated[float, Field(gt=0.0, le=100.0)] = 5.0
+    """Shortest range; a nearer return is invalid and counts as blocked [m]."""
+    rate_hz: Annotated[float, Field(gt=0.0, le=100.0)] = 1.0 / Setting.dt
+    """Scans per second; a robot decides once for each scan [Hz]."""
 
 
 class NoiseModel(_Strict):
     """Sensor errors, one standard deviation each; 0 is none."""
 
-    range_fraction: Annotated[float, Field(ge=0.0, le=0.3)] = 0.0
-    """Of a LiDAR range and of the distance to a neighbour."""
-    dropout: Fraction = 0.0
-    """Share of LiDAR returns lost."""
-    bearing_deg: Annotated[float, Field(ge=0.0, le=45.0)] = 0.0
-    compass_deg: Annotated[float, Field(ge=0.0, le=45.0)] = 0.0
+    range_fraction: Annotated[float, Field(ge=0.0, le=0.3)] = NOISE.range_fraction
+    """Error of a LiDAR range, and of the distance to a neighbour, as a fraction of it."""
+    dropout: Fraction = NOISE.dropout
+    """Share of LiDAR returns that are lost."""
+    bearing_deg: Annotated[float, Field(ge=0.0, le=45.0)] = math.degrees(NOISE.bearing_rad)
+    """Error of the bearing of a neighbour [°]."""
+    compass_deg: Annotated[float, Field(ge=0.0, le=45.0)] = math.degrees(NOISE.compass_rad)
+    """Error of a robot's compass, drawn anew for every scan [°]."""
 
 
 class RadioModel(_Strict):
     """The link between robots."""
 
-    range_m: NotNegative = 15.0
-    latency_s: NotNegative = 0.005
-    loss: Fraction = 0.0
-    bitrate_bps: Positive = 78125.0
-    exact_features: bool = False
-    """Send float32 features instead of bytes (to measure what quantisation costs)."""
+    range_m: NotNegative = RADIO.range_m
+    """Packets to robots farther away are sent in vain [m]."""
+    latency_s: NotNegative = RADIO.latency_s
+    """From the end of the sending to the delivery [s]."""
+    loss: Fraction = RADIO.loss
+    """Share of packets that are lost by chance."""
+    bitrate_bps: Positive = RADIO.bitrate_bps
+    """Bandwidth of a robot's radio: a packet occupies sender and receiver for its bits over this [bit/s]."""
+    exact_features: bool = Sharing().exact_features
+    """Send features as float32 instead of bytes (to measure what quantisation costs)."""
 
 
 class GuardModel(_Strict):
     """Distances kept free around the body."""
 
-    clearance_m: NotNegative = 0.02
-    footprint_clearance_m: NotNegative = 0.03
-    persistence_s: NotNegative = 2.0
+    clearance_m: NotNegative = GUARDING.clearance_m
+    """Kept free around the body by the guard, which slows down or stops [m]."""
+    footprint_clearance_m: NotNegative = GUARDING.footprint_clearance_m
+    """Added to the radius where ways are planned: directions that the widened body can take are safe [m]."""
+    persistence_s: NotNegative = GUARDING.persistence_s
+    """How long a neighbour that is out of sight is remembered [s]."""
 
 
 class SafetyModel(_Strict):
-    """Which directions are safe (docs/theory.md); ``sector: true, look_ahead_m: 0`` is the printed rule."""
+    """Which directions are safe (theory.md); ``sector: true, look_ahead_m: 0`` is the printed rule."""
 
-    sector: bool = False
-    look_ahead_m: NotNegative = 2.0
-    margin_m: NotNegative = 0.04
-    narrow_m: NotNegative = 1.2
+    sector: bool = SAFETY.sector
+    """Demand a free sector as wide as the scope angle within the planning distance l_th, as printed (3)."""
+    look_ahead_m: NotNegative = SAFETY.look_ahead_m
+    """How far ahead a direction must be free; 0 leaves it at l_th [m]."""
+    margin_m: NotNegative = SAFETY.margin_m
+    """Kept on both sides of the body within ``look_ahead_m`` [m]."""
+    narrow_m: NotNegative = SAFETY.narrow_m
+    """How far ahead a gap must be free that the body just fits, when no direction is safe; 0 is r [m]."""
 
 
 class TaskModel(_Strict):
     """A task by name, with its options."""
 
     name: str
+    """Name of the task (``swarmscope tasks``)."""
     options: dict[str, float | str] = {}
+    """Options of the task by name; those not given have their defaults."""
 
 
 class MapModel(_Strict):
     """A map_server map; starts and goals are drawn from its free space."""
 
     file: str
+    """The map's YAML file (looked for beside the scenario, too), or the name of a packaged map."""
     min_distance_m: NotNegative = 8.0
+    """From a start to its goal, at least [m]."""
 
 
 class WorldModel(_Strict):
     """A world written out: obstacles, starts and goals."""
 
     world: WorldSpec
+    """Bounds and obstacles."""
     starts: list[tuple[float, float, float]]
+    """Where each robot starts: x, y, yaw [m, m, rad]."""
     goals: list[tuple[float, float]]
+    """Where each robot wants to go: x, y [m]."""
 
 
 class PlannerModel(_Strict):
     """A planner by name, with its parameters."""
 
     name: str = "nav-scope"
+    """Name of the planner (``swarmscope planners``)."""
     model: str | None = None
     """Folder of the network that it runs instead of its own; only for planners with a network."""
     params: dict[str, Annotated[float, Field(allow_inf_nan=False)]] = {}
+    """Parameters of the planner by name; those not given have their defaults."""
 
 
 class Scenario(_Strict):
     """One run, complete: exactly one of ``task``, ``map``, ``place``."""
 
     task: TaskModel | None = None
+    """World, starts and goals made from the seed."""
     map: MapModel | None = None
+    """Instead of ``task``: a building."""
     place: WorldModel | None = None
+    """Instead of ``task``: a world written out."""
     planner: PlannerModel = PlannerModel()
+    """Who decides."""
     robots: Annotated[int, Field(ge=1, le=200_000)] = 15
-    seed: Annotated[int, Field(ge=0, lt=2**31)] = 0
+    """Number of robots."""
+    seed: Annotated[int, Field(ge=0, lt=2**31)] = Setting.seed
+    """Seed of the world, of all noise and of what planners toss for."""
     robot: RobotModel = RobotModel()
+    """The robots' data sheet."""
     lidar: LidarModel = LidarModel()
+    """The LiDAR."""
     noise: NoiseModel = NoiseModel()
+    """Sensor errors, one standard deviation each; 0 is none."""
     radio: RadioModel = RadioModel()
+    """The link between robots."""
     guard: GuardModel = GuardModel()
+    """Distances kept free around the body."""
     safety: SafetyModel = SafetyModel()
-    limit_s: Positive = 300.0
-    substeps: Annotated[int, Field(ge=1, le=1000)] = 20
+    """Which directions are safe."""
+    limit_s: Positive = Setting.limit_s
+    """Simulated time after which the run ends; it ends earlier when all have arrived or collided [s]."""
+    substeps: Annotated[int, Field(ge=1, le=1000)] = Setting.substeps
+    """Steps of motion and contact between two scans."""
     record_scans: Literal["auto", "yes", "no"] = "auto"
+    """Keep scans for the replay page; ``auto`` leaves them out where they would be huge."""
     judge_sides: bool = False
-    """Note the side of the shortest way beside every choice; planners with ``told`` set take it."""
+    """Note the side of the shortest way beside every choice of a side; planners with ``told`` set take it."""
 
     @model_validator(mode="after")
     def _one_place(self) -> Self:

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from swarmscope.onboard.body import Body
-from swarmscope.onboard.percept import Rig, Sensor, make_rig
-from swarmscope.onboard.planning._contract import load_planner, make_params
+from swarmscope.onboard.planners import Planner, load_planner
+from swarmscope.onboard.rig import Guarding, Rig, Safety, Sharing, make_rig
+from swarmscope.onboard.sensor import Sensor
 from swarmscope.scenarios.places import is_packaged
-from swarmscope.scenarios.scenario import PlannerModel, Scenario
+from swarmscope.scenarios.scenario import NoiseModel, PlannerModel, Scenario
 from swarmscope.sim.lidar import make_beams
 from swarmscope.sim.loop import Setting
 from swarmscope.sim.state import Noise, Radio
@@ -30,7 +31,7 @@ def complete(scenario: Scenario, run_files: bool = True) -> dict[str, Any]:
     values = scenario.model_dump(mode="json", exclude_none=True)
     planner, task = scenario.planner, scenario.task
     if run_files or not is_file_name(planner.name):
-        values["planner"]["params"] = make_params(load_planner(planner.name), planner.params)._asdict()
+        values["planner"]["params"] = load_planner(planner.name).settings(planner.params)
     if task is not None and (run_files or not is_file_name(task.name)):
         values["task"]["options"] = all_options(load_task(task.name), task.options)
     for group in ("planner", "task"):
@@ -58,22 +59,18 @@ def make_rig_of(scenario: Scenario) -> Rig:
         position_sigma=math.hypot(noise.range_fraction, math.radians(noise.bearing_deg)),
     )
     body = Body(**robot.model_dump())
+    guard, safety = scenario.guard, scenario.safety
     return make_rig(
         body,
         sensor,
-        footprint_clearance=scenario.guard.footprint_clearance_m,
-        clearance=scenario.guard.clearance_m,
-        persistence=scenario.guard.persistence_s,
-        exact_features=scenario.radio.exact_features,
-        sector=scenario.safety.sector,
-        look_ahead=scenario.safety.look_ahead_m,
-        margin=scenario.safety.margin_m,
-        narrow=scenario.safety.narrow_m,
+        Guarding(**guard.model_dump()),
+        Safety(**safety.model_dump()),
+        Sharing(exact_features=scenario.radio.exact_features),
     )
 
 
-def planner_of(chosen: PlannerModel) -> Any:
-    """Return the planner's module, or the planner with the model that is named instead of its own."""
+def planner_of(chosen: PlannerModel) -> Planner:
+    """Return the planner, or the planner with the model that is named instead of its own."""
     planner = load_planner(chosen.name)
     return planner if chosen.model is None else planner.with_model(chosen.model)
 
@@ -85,10 +82,19 @@ def _with_run_seed(params: Any, seed: int) -> Any:
     return params._replace(seed=int(np.random.SeedSequence([seed, int(params.seed)]).generate_state(1)[0]))
 
 
+def _noise_of(noise: NoiseModel) -> Noise:
+    """Return the errors in the units of the kernels."""
+    return Noise(
+        range_fraction=noise.range_fraction,
+        dropout=noise.dropout,
+        bearing_rad=math.radians(noise.bearing_deg),
+        compass_rad=math.radians(noise.compass_deg),
+    )
+
+
 def make_setting(scenario: Scenario, setup: Setup, threads: int = 1) -> Setting:
     """Return the run of ``scenario`` in ``setup``, ready for the kernels."""
     planner = planner_of(scenario.planner)
-    noise, radio = scenario.noise, scenario.radio
     ticks = scenario.limit_s * scenario.lidar.rate_hz
     heavy = ticks * scenario.robots * scenario.lidar.beams > 4e7
     return Setting(
@@ -99,17 +105,9 @@ def make_setting(scenario: Scenario, setup: Setup, threads: int = 1) -> Setting:
         beams=make_beams(scenario.lidar.beams, math.radians(scenario.lidar.fov_deg), scenario.lidar.range_m),
         rig=make_rig_of(scenario),
         planner=planner,
-        params=_with_run_seed(make_params(planner, scenario.planner.params), scenario.seed),
-        noise=Noise(
-            range_sigma=noise.range_fraction,
-            dropout=noise.dropout,
-            position_range_sigma=noise.range_fraction,
-            bearing_sigma=math.radians(noise.bearing_deg),
-            compass_sigma=math.radians(noise.compass_deg),
-        ),
-        radio=Radio(
-            range_m=radio.range_m, latency_s=radio.latency_s, loss=radio.loss, bitrate=radio.bitrate_bps
-        ),
+        params=_with_run_seed(planner.params(scenario.planner.params), scenario.seed),
+        noise=_noise_of(scenario.noise),
+        radio=Radio(**scenario.radio.model_dump(exclude={"exact_features"})),
         seed=scenario.seed,
         dt=1.0 / scenario.lidar.rate_hz,
         substeps=scenario.substeps,

@@ -31,7 +31,7 @@ def _send(sim: Sim, tick: int, i: int, k: int) -> None:
         return
     features = not is_request(decision["out"][k, 0])
     receiver = sim.robots[j]
-    airtime = 8.0 * (length + radio.overhead_bytes) / radio.bitrate
+    airtime = 8.0 * (length + radio.overhead_bytes) / radio.bitrate_bps
     now = tick * sim.clock.dt
     begin = max(now, max(sender["radio_free_s"], receiver["radio_free_s"]))
     if begin - now > radio.max_wait_s:

@@ -39,9 +39,9 @@ def sense(sim: Sim, tick: int, first: int, last: int) -> None:
 @jit_inner
 def _compass_error(sim: Sim, tick: int, i: int) -> float:
     """Return the error of robot i's compass at this tick [rad]."""
-    if sim.noise.compass_sigma <= 0.0:
+    if sim.noise.compass_rad <= 0.0:
         return 0.0
-    return sim.noise.compass_sigma * normal(key(sim.clock.seed, i, tick, COMPASS_NOISE))
+    return sim.noise.compass_rad * normal(key(sim.clock.seed, i, tick, COMPASS_NOISE))
 
 
 @jit_inner
@@ -86,8 +86,8 @@ def _scan_and_neighbours(sim: Sim, tick: int, i: int) -> None:
             found = _insert(percept, found, j, bx, by)
     _keep_visible(sim, tick, i, found)
     noise = sim.noise
-    if noise.range_sigma > 0.0:
-        add_scan_noise(ranges, key(sim.clock.seed, i, tick, SCAN_NOISE), noise.range_sigma, sim.beams.range_max)
+    if noise.range_fraction > 0.0:
+        add_scan_noise(ranges, key(sim.clock.seed, i, tick, SCAN_NOISE), noise.range_fraction, sim.beams.range_max)
     if noise.dropout > 0.0:
         drop_returns(ranges, key(sim.clock.seed, i, tick, SCAN_DROP), noise.dropout)
     if sim.range_min > 0.0:
@@ -129,11 +129,11 @@ def _keep_visible(sim: Sim, tick: int, i: int, found: int) -> None:
             n = n % ranges.size
         if n < 0 or n >= ranges.size or ranges[n] < distance - sim.radius - SIGHT_SLACK:
             continue
-        if noise.position_range_sigma > 0.0 or noise.bearing_sigma > 0.0:
+        if noise.range_fraction > 0.0 or noise.bearing_rad > 0.0:
             bits = mix(key(sim.clock.seed, i, tick, RANGE_NOISE) + key(0, j, 0, RANGE_NOISE))
-            distance *= 1.0 + noise.position_range_sigma * normal(bits)
+            distance *= 1.0 + noise.range_fraction * normal(bits)
             bits = mix(key(sim.clock.seed, i, tick, BEARING_NOISE) + key(0, j, 0, BEARING_NOISE))
-            bearing += noise.bearing_sigma * normal(bits)
+            bearing += noise.bearing_rad * normal(bits)
             x, y = distance * math.cos(bearing), distance * math.sin(bearing)
         ids[kept], xs[kept], ys[kept] = j, x, y
         heading = sim.robots[j]["yaw"] + _compass_error(sim, tick, j)

@@ -1,0 +1,71 @@
+"""Changes to a scenario that is not checked yet: by text (``key.path=value``) and by Python values (``key__path``)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from typing import Any
+
+import yaml
+
+from swarmscope.errors import ConfigError
+from swarmscope.scenarios.plain import plain
+
+PLACES = ("task", "map", "place")
+
+
+def choose(values: dict[str, Any], group: str, key: str, value: str) -> None:
+    """Set ``group.key``; the group's other keys stay if they were written for the same value."""
+    if group in PLACES:
+        leave_only(values, group)
+    given = values.get(group)
+    same = isinstance(given, dict) and given.get(key) == value
+    values[group] = given if same else {key: value}
+
+
+def leave_only(values: dict[str, Any], place: str) -> None:
+    """Remove the other places than ``place``."""
+    for other in PLACES:
+        if other != place:
+            values.pop(other, None)
+
+
+def set_key(values: dict[str, Any], change: str) -> None:
+    """Apply one ``key.path=value`` to the nested mapping."""
+    path, equals, text = change.partition("=")
+    if not equals or not all(path.split(".")):
+        raise ConfigError(f"--set {change}", "must look like key.path=value")
+    set_path(values, path.split("."), _read(text, change), f"--set {change}")
+
+
+def set_path(values: dict[str, Any], path: Sequence[str], value: Any, where: str) -> None:
+    """Set the value at ``path`` of the nested mapping; ``where`` begins the error when a part is no group."""
+    at: Any = values
+    *parents, last = path
+    for part in parents:
+        at = at.setdefault(part, {})
+        if not isinstance(at, dict):
+            raise ConfigError(where, f"'{part}' is not a group of keys")
+    at[last] = value
+
+
+def override(values: dict[str, Any], changes: Mapping[str, Any], where: str) -> None:
+    """Apply ``{"robot__radius_m": 0.2}`` or ``{"robot": {"radius_m": 0.2}}``: keys that are not named stay."""
+    for name, value in changes.items():
+        if isinstance(value, Mapping):
+            override(values, {f"{name}__{key}": item for key, item in value.items()}, where)
+        else:
+            path = name.split("__")
+            set_path(values, path, plain(value), f"{where}: {'.'.join(path)}")
+
+
+def _read(text: str, change: str) -> Any:
+    """Return ``text`` as YAML reads it; 1e-3, which YAML 1.1 takes for text, is a number."""
+    try:
+        value = yaml.safe_load(text)
+    except yaml.YAMLError:
+        raise ConfigError(f"--set {change}", "the value is not valid YAML") from None
+    if isinstance(value, str):
+        with suppress(ValueError):
+            return float(value)
+    return value
