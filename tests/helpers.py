@@ -128,8 +128,9 @@ def place_scenario(starts, goals, obstacles=(), bounds=BOUNDS, **more):
 
 def run_scenario(values, threads=1):
     """Run a scenario given as a mapping; return its trace."""
+    from swarmscope.scenarios.places import make_setup
     from swarmscope.scenarios.read import parse_scenario
-    from swarmscope.scenarios.to_kernels import make_setting, make_setup
+    from swarmscope.scenarios.to_kernels import make_setting
     from swarmscope.sim.loop import run
 
     scenario = parse_scenario(values, "test")

@@ -40,22 +40,17 @@ def kernel_folder() -> Path:
     return Path(os.environ.get("SWARMSCOPE_CACHE") or user) / "kernels"
 
 
-def cache_folder(file: Path, folder: Path | None = None, also: Path | None = None) -> Path | None:
-    """Return the folder for the kernels of one file in its present state; None if there cannot be one.
-
-    They depend on what the file imports and, if that is given, on what ``also`` imports.
+def cache_folder(file: Path, state: str) -> Path | None:
+    """Return the folder for the kernels of one file in one state; None if there cannot be one.
 
     Numba compiles a cached kernel anew when its own file has changed, but not when a function that it calls from
     another file does; a folder for each state of everything that the file imports (see ``closure``) rules out results
     of mixed versions, and leaves alone what does not import a file that was edited.
     """
     try:
-        state = closure_state(file, folder)
-        if also is not None:
-            state = hashlib.sha256(f"{state} {closure_state(also)}".encode()).hexdigest()
-        return _made(file, state[:16])
+        return _made(file, state)
     except (OSError, RuntimeError):
-        return None  # no home, no room, or no such file: Numba finds a place of its own
+        return None  # no home, or no room: Numba finds a place of its own
 
 
 @cache
@@ -124,10 +119,10 @@ warnings.filterwarnings("ignore", "Record.*has been considered a subtype", numba
 
 
 def jit_for(function: F, file: Path | None = None, options: dict[str, Any] = LEAN) -> F:
-    """Compile ``function``; its cached code is valid as long as nothing changes in what ``file`` imports.
+    """Compile ``function``; its cached code is valid as long as nothing changes in what its file imports.
 
-    ``file`` is the one that holds the function unless told otherwise: a loop that is made from one file's code with
-    the functions of another one depends on both.
+    With ``file``, what that one imports counts, too: a loop that is made from one file's code with functions of
+    another one depends on both.
     """
     njit: Any = numba.njit
     with _cached_in(_cache_of(function, file)):
@@ -139,10 +134,14 @@ def _cache_of(function: Callable[..., Any], file: Path | None) -> Path | None:
     if config.DISABLE_JIT:
         return None
     own = Path(os.path.realpath(function.__code__.co_filename))
-    if file is not None:
-        return cache_folder(Path(os.path.realpath(file)), also=own)
+    place = own if file is None else Path(os.path.realpath(file))
     package = function.__module__.partition(".")[0]
-    return cache_folder(own, Path(sys.modules[package].__path__[0]) if package.startswith(OF_A_USER) else None)
+    folder = Path(sys.modules[package].__path__[0]) if package.startswith(OF_A_USER) else None
+    try:
+        states = [closure_state(one, folder) for one in dict.fromkeys((place, own))]
+    except OSError:
+        return None  # made from text: there is no such file
+    return cache_folder(place, hashlib.sha256("".join(states).encode()).hexdigest()[:16])
 
 
 def jit(function: F) -> F:

@@ -10,11 +10,13 @@ from hypothesis import strategies as st
 
 from swarmscope.errors import ConfigError, InputFileError, SwarmscopeError, UnknownNameError
 from swarmscope.onboard.planning.dh_bug import toss
-from swarmscope.scenarios.read import load_scenario, map_path, parse_scenario
+from swarmscope.scenarios.places import make_setup, map_path
+from swarmscope.scenarios.read import load_scenario, parse_scenario
 from swarmscope.scenarios.scenario import Scenario
-from swarmscope.scenarios.to_kernels import complete, make_rig_of, make_setting, make_setup, task_options
+from swarmscope.scenarios.to_kernels import complete, make_rig_of, make_setting
 from swarmscope.sim.maps import packaged_map
 from swarmscope.tasks import load_task, task_names
+from swarmscope.tasks._contract import all_options, option_fields
 
 T1 = {"task": {"name": "T1"}}
 PLACE = {
@@ -119,7 +121,7 @@ def test_a_complete_scenario_survives_yaml_and_says_everything(values):
     assert set(written) == set(Scenario.model_fields) - ({"task", "map", "place"} - set(values))
     assert set(written["planner"]["params"]) == set(make_setting_params(scenario))
     if "task" in written:
-        assert set(written["task"]["options"]) == set(task_options(load_task(scenario.task.name)))
+        assert set(written["task"]["options"]) == set(option_fields(load_task(scenario.task.name)))
 
 
 def make_setting_params(scenario):
@@ -130,7 +132,7 @@ def make_setting_params(scenario):
 
 def test_options_of_every_task_can_be_given_back():
     for name in task_names():
-        options = task_options(load_task(name))
+        options = all_options(load_task(name), {})
         assert options and all(isinstance(value, float | str) for value in options.values())
         a = make_setup(parse_scenario({"task": {"name": name}, "robots": 2}, "test"))
         b = make_setup(parse_scenario({"task": {"name": name, "options": options}, "robots": 2}, "test"))

@@ -9,12 +9,11 @@ from types import ModuleType
 
 from rich.table import Table
 
-from swarmscope.bounds import about
+from swarmscope.bounds import Value, about
 from swarmscope.cli._console import PlainConsole
 from swarmscope.onboard.planners import load_planner, planner_names
-from swarmscope.scenarios.to_kernels import task_options
 from swarmscope.tasks import load_task, task_names
-from swarmscope.tasks._contract import Option
+from swarmscope.tasks._contract import all_options
 
 
 def list_planners() -> None:
@@ -36,13 +35,13 @@ def list_tasks() -> None:
     table = Table("task", "what it is", "task.options and defaults")
     for name in task_names():
         task = load_task(name)
-        options = " ".join(f"{key}={_short(value)}" for key, value in task_options(task).items())
+        options = " ".join(f"{key}={_short(value)}" for key, value in all_options(task, {}).items())
         table.add_row(name, task.SUMMARY, options)
     PlainConsole().print(table)
     print("Example of an option: swarmscope run --task T1 --set task.options.density=0.2")
 
 
-def _short(value: Option) -> str:
+def _short(value: Value) -> str:
     return value if isinstance(value, str) else f"{value:g}"
 
 

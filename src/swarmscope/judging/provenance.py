@@ -6,6 +6,7 @@ import importlib.metadata
 import os
 import platform
 import subprocess
+from functools import cache
 from pathlib import Path
 
 import swarmscope
@@ -45,6 +46,16 @@ def installed_version(package: str) -> str:
         return importlib.metadata.version(package)
     except importlib.metadata.PackageNotFoundError:
         return "unknown"
+
+
+@cache
+def library_version(module: str) -> str:
+    """Return the version of the package that a top-level module belongs to, which may be called otherwise."""
+    version = installed_version(module)
+    if version != "unknown":
+        return version
+    packages = sorted(importlib.metadata.packages_distributions().get(module, []))
+    return " ".join(f"{package} {installed_version(package)}" for package in packages) or "unknown"
 
 
 def _git(folder: Path, *arguments: str) -> str:

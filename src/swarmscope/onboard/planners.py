@@ -26,7 +26,7 @@ import numpy as np
 
 from swarmscope.bounds import Field, converted, fields_of
 from swarmscope.errors import ConfigError, InputFileError
-from swarmscope.members import Kind, Need, check, is_text, load, names_of, text
+from swarmscope.members import Kind, Need, check, find, is_text, load, names_of, text
 from swarmscope.onboard.loops import Step, batch_step, compiled_step, is_compiled, plain_step
 from swarmscope.onboard.reasons import REASON_NAMES
 from swarmscope.onboard.tick import guard_all, perceive_all
@@ -199,6 +199,11 @@ OPTIONAL = (
 def planner_names() -> list[str]:
     """Return the names of all planners."""
     return names_of(KIND)
+
+
+def planner_file(name: str) -> Path:
+    """Return the file of a planner, without importing it."""
+    return find(KIND, name).file
 
 
 def all_planners() -> dict[str, Planner]:
