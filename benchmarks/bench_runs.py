@@ -15,7 +15,7 @@ from swarmscope.errors import SwarmscopeError
 from swarmscope.experiments.work import make_job, unit_key, work, world_key
 from swarmscope.judging.run import find_references, play
 from swarmscope.judging.sides import make_advice
-from swarmscope.onboard.planning._contract import load_planner, planner_names
+from swarmscope.onboard.planners import load_planner, planner_names
 from swarmscope.scenarios.read import parse_scenario
 from swarmscope.scenarios.to_kernels import complete, make_setup
 
@@ -37,7 +37,7 @@ def costs(planner: str, seed: int) -> dict[str, float]:
     times.append(time.perf_counter())
     references = find_references(scenario, setup)
     times.append(time.perf_counter())
-    if getattr(load_planner(planner), "TOLD_SIDE", False):
+    if load_planner(planner).told:
         make_advice(setup, scenario.robot.radius_m + scenario.safety.margin_m)
     times.append(time.perf_counter())
     run_s = play(scenario, references=references).trace.wall_s
@@ -77,7 +77,7 @@ def main() -> None:
     print("a million units on 1, 16, 1000 cores")
     for planner in planner_names():
         try:
-            getattr(load_planner(planner), "check_available", lambda: None)()
+            load_planner(planner).check_available()
         except SwarmscopeError as error:
             print(f"{planner:10s} left out: {error}")
             continue

@@ -10,11 +10,11 @@ import time
 
 import numpy as np
 
-from swarmscope.onboard.percept import DECISION, PERCEPT, new_scratch, new_shared
 from swarmscope.onboard.perception.filters import filter_padded, prepare_scan
-from swarmscope.onboard.planning import nav_scope
-from swarmscope.onboard.planning._contract import make_params
-from swarmscope.onboard.sharing.message import encode_features
+from swarmscope.onboard.planners import load_planner
+from swarmscope.onboard.rig import Rig
+from swarmscope.onboard.sharing.message import Head, encode_features
+from swarmscope.onboard.view import Swarm, new_swarm
 from swarmscope.scenarios.read import parse_scenario
 from swarmscope.scenarios.to_kernels import make_rig_of, make_setup
 from swarmscope.sim.lidar import cast_static, make_beams
@@ -43,10 +43,11 @@ def blocked_scans(robots: int) -> tuple[np.ndarray, np.ndarray]:
     return np.array(scans), np.array(bearings)
 
 
-def prepared(robots: int) -> dict[str, np.ndarray]:
-    """Return percepts and memories just before a choice of side with four answers in the inbox."""
-    scans, bearings = blocked_scans(robots)
-    percepts, shared = np.zeros(robots, PERCEPT), new_shared(robots)
+def prepared(robots: int, rig: Rig) -> Swarm:
+    """Return robots just before a choice of side with four answers in the inbox."""
+    swarm = new_swarm(robots, rig)
+    percepts, shared = swarm.percepts, swarm.shared
+    swarm.scans[:], bearings = blocked_scans(robots)
     rng = np.random.default_rng(2)
     percepts["now_s"], percepts["dt_s"], percepts["speed"] = 10.0, 0.2, 0.5
     percepts["goal_bearing"], percepts["goal_distance"] = bearings, 12.0
@@ -61,24 +62,23 @@ def prepared(robots: int) -> dict[str, np.ndarray]:
             angles = np.sort(rng.uniform(0.0, 2.0 * np.pi, 10))
             distances = rng.uniform(0.8, 5.0, 10)
             percepts["packet_length"][i, k] = encode_features(
-                100 + k, 1, 7, angles, distances, 10, 5.0, percepts["packet"][i, k]
+                Head(100 + k, 1, 7), angles, distances, 10, 5.0, percepts["packet"][i, k]
             )
-    return {"scans": scans, "percepts": percepts, "shared": shared, "memory": nav_scope.new_memory(robots)}
+    return swarm
 
 
 def step_us() -> tuple[float, float]:
     """Return the time of one step [us] (best of the repeats) and the mean number of neighbours fused."""
     scenario = parse_scenario({"task": {"name": "T1"}}, "bench")
-    rig, params = make_rig_of(scenario), make_params(nav_scope, {})
-    before = prepared(ROBOTS)
-    decisions, scratch = np.zeros(ROBOTS, DECISION), new_scratch(ROBOTS, rig)
+    planner = load_planner("nav-scope")
+    params, before = planner.params(), prepared(ROBOTS, make_rig_of(scenario))
+    decisions = before.decisions
     best = np.inf
     for _ in range(REPEATS):
-        percepts, shared, memory = (before[k].copy() for k in ("percepts", "shared", "memory"))
+        swarm = before._replace(percepts=before.percepts.copy(), shared=before.shared.copy())
+        memory = planner.new_memory(ROBOTS)
         start = time.perf_counter_ns()
-        nav_scope.step_all(
-            0, ROBOTS, before["scans"], percepts, shared, memory, decisions, scratch, rig, params
-        )
+        planner.step_all(0, ROBOTS, swarm, memory, params)
         best = min(best, (time.perf_counter_ns() - start) / 1e3 / ROBOTS)
     if not decisions["fused"].all():
         raise SystemExit("the benchmark's robots did not all choose a side")
@@ -100,7 +100,7 @@ def filter_us() -> float:
     """Return the time of the 61-tap direct filter on one 360-beam scan, padding included [us]."""
     rig = make_rig_of(parse_scenario({"task": {"name": "T1"}}, "bench"))
     scans, _ = blocked_scans(ROBOTS)
-    scratch = new_scratch(1, rig)
+    scratch = new_swarm(1, rig)
     best = np.inf
     for _ in range(REPEATS):
         start = time.perf_counter_ns()

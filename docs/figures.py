@@ -12,9 +12,8 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.patches import Circle, Wedge
 
-from swarmscope.scenarios.read import parse_scenario
-from swarmscope.scenarios.to_kernels import make_rig_of, make_setup
-from swarmscope.onboard.percept import Rig
+from swarmscope.onboard.body import Body, protection_model
+from swarmscope.onboard.deciding.fields import interaction_force
 from swarmscope.onboard.perception.areas import passable_distance
 from swarmscope.onboard.perception.features import extrema, reconstruct
 from swarmscope.onboard.perception.filters import (
@@ -25,8 +24,9 @@ from swarmscope.onboard.perception.filters import (
     scope_filter,
 )
 from swarmscope.onboard.perception.safety import safe_directions
-from swarmscope.onboard.planning.fields import interaction_force
-from swarmscope.onboard.body import Body, protection_model
+from swarmscope.onboard.rig import AHEAD, PRINTED, Rig
+from swarmscope.scenarios.read import parse_scenario
+from swarmscope.scenarios.to_kernels import make_rig_of, make_setup
 from swarmscope.sim.lidar import cast_static, make_beams
 from swarmscope.sim.world import compile_world
 
@@ -152,11 +152,11 @@ def forest_scan() -> tuple[Rig, Rig, np.ndarray]:
     return make_rig_of(scenario), make_rig_of(printed), ranges
 
 
-def safe_of(rig: Rig, ranges: np.ndarray, rule: int = 0) -> np.ndarray:
-    """Return the safe directions of a scan as booleans; rule 3 is the printed one that masks the features."""
+def safe_of(rig: Rig, ranges: np.ndarray, rule: int = AHEAD) -> np.ndarray:
+    """Return the safe directions of a scan as booleans; rule PRINTED masks the features."""
     sensor = rig.sensor
     edges, safe = np.zeros(ranges.size + 1, np.int16), np.zeros(ranges.size, np.uint8)
-    safe_directions(ranges, sensor.range_min, sensor.range_max, sensor.wraps, rig.reach[rule], edges, safe)
+    safe_directions(ranges, sensor, rig.reach[rule], edges, safe)
     return safe.astype(bool)
 
 
@@ -168,16 +168,7 @@ def features_of(rig: Rig, ranges: np.ndarray, safe: np.ndarray) -> tuple[np.ndar
     prepare_scan(ranges, sensor.range_min, sensor.range_max, sensor.wraps, rig.half, padded)
     filter_padded(padded, rig.taps, sensor.range_max, filtered)
     angles, distances = np.zeros(16), np.zeros(16)
-    n = extrema(
-        filtered,
-        safe.astype(np.uint8),
-        sensor.angle_min,
-        sensor.increment,
-        sensor.wraps,
-        sensor.range_max,
-        angles,
-        distances,
-    )
+    n = extrema(filtered, safe.astype(np.uint8), sensor, angles, distances)
     return filtered, angles[:n], distances[:n]
 
 
@@ -216,7 +207,7 @@ def scan() -> plt.Figure:
         reach = which.look_ahead if which.look_ahead > 0 else which.protection.l_th
         ax.plot(np.linspace(0, 2 * math.pi, 200), np.full(200, reach), color=RED, lw=1.1, ls="--")
         ax.set_title(f"{title}\n{safe.sum()} of {safe.size} directions", fontsize=10.5)
-    filtered, at, distance = features_of(rig, ranges, safe_of(rig, ranges, 3))
+    filtered, at, distance = features_of(rig, ranges, safe_of(rig, ranges, PRINTED))
     ax = axes[2]
     ax.plot(circle, np.append(filtered, filtered[0]), color=BLUE, lw=1.8, label="filtered scan $y_2$")
     loop = np.append(at, at[0] + 2 * math.pi)

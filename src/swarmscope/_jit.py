@@ -105,3 +105,8 @@ def jit_inner(function: F) -> F:
 def jit_alloc(function: F) -> F:
     """Compile ``function`` in nopython mode, cached on disk; it may allocate (set-up and evaluation only)."""
     return _compile(function, OPTIONS)
+
+
+def jit_paste(function: F) -> F:
+    """Paste ``function`` into its callers before they are typed; for what returns views of arrays of records."""
+    return _compile(function, LEAN | {"inline": "always"})

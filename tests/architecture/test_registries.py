@@ -10,7 +10,8 @@ import pytest
 from swarmscope import tasks
 from swarmscope.errors import UnknownNameError
 from swarmscope.onboard import planning
-from swarmscope.onboard.planning._contract import NOT_PLANNERS, load_planner, make_params, planner_names
+from swarmscope.onboard.planners import load_planner, planner_names
+from swarmscope.onboard.reasons import NOT_PLANNERS
 from swarmscope.tasks._contract import load_task, task_names
 
 

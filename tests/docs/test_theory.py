@@ -13,7 +13,7 @@ import pytest
 from swarmscope.onboard.body import Body, protection_model
 from swarmscope.onboard.perception.areas import normalise, passable_distance, quadrant_area
 from swarmscope.onboard.planning import nav_scope
-from swarmscope.onboard.planning.fields import (
+from swarmscope.onboard.deciding.fields import (
     following_probability,
     fuse,
     interaction_force,

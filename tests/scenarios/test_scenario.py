@@ -123,7 +123,7 @@ def test_a_complete_scenario_survives_yaml_and_says_everything(values):
 
 
 def make_setting_params(scenario):
-    from swarmscope.onboard.planning._contract import load_planner
+    from swarmscope.onboard.planners import load_planner
 
     return load_planner(scenario.planner.name).Params._fields
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from helpers import DT, circles_world, place_sim, rig_of, wall, world_of
 from swarmscope.onboard.body import Body
-from swarmscope.onboard.planning._contract import ARRIVED
+from swarmscope.onboard.reasons import ARRIVED
 from swarmscope.sim.cells import index_robots
 from swarmscope.sim.motion import judge, move
 

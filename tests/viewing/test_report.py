@@ -447,7 +447,7 @@ def test_a_run_that_cannot_be_played_again_leaves_a_note(tmp_path: Path):
 
 
 def test_the_shipped_experiment_has_a_report(tmp_path: Path):
-    from swarmscope.onboard.planning._contract import planner_names
+    from swarmscope.onboard.planners import planner_names
 
     if not {"dh-bug", "orca", "nav-i", "oracle"} <= set(planner_names()):
         pytest.skip("planners of the shipped experiment are missing")

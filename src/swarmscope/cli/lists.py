@@ -10,7 +10,7 @@ from types import ModuleType
 from rich.table import Table
 
 from swarmscope.cli._console import PlainConsole
-from swarmscope.onboard.planning._contract import load_planner, planner_names
+from swarmscope.onboard.planners import load_planner, planner_names
 from swarmscope.scenarios.to_kernels import task_options
 from swarmscope.tasks import load_task, task_names
 from swarmscope.tasks._contract import Option
@@ -20,12 +20,13 @@ def list_planners() -> None:
     """Print every planner with what it is given and its parameters."""
     console = PlainConsole()
     for name in planner_names():
-        module = load_planner(name)
-        console.print(f"[bold]{name}[/bold]  {module.SUMMARY.removeprefix(f'{name}: ')}")
-        console.print(f"  is given: {module.NEEDS}", highlight=False)
-        table = Table("planner.params", "default", "meaning")
-        for field, default in module.Params._field_defaults.items():
-            table.add_row(field, str(default), field_docs(module, "Params").get(field, ""))
+        planner = load_planner(name)
+        console.print(f"[bold]{name}[/bold]  {planner.summary.removeprefix(f'{name}: ')}")
+        console.print(f"  is given: {planner.needs}", highlight=False)
+        table = Table("planner.params", "default", "bounds", "meaning")
+        docs = field_docs(planner.module, "Params")
+        for field, default in planner.defaults.items():
+            table.add_row(field, str(default), planner.bounds(field), docs.get(field, ""))
         console.print(table)
 
 

@@ -106,9 +106,7 @@ def _check_available(scenarios: list[Scenario]) -> None:
     """Raise an error before anything is run if some planner lacks its library or its network here."""
     chosen = {(s.planner.name, s.planner.model or ""): s.planner for s in scenarios}
     for key in sorted(chosen):
-        check = getattr(planner_of(chosen[key]), "check_available", None)
-        if check is not None:
-            check()
+        planner_of(chosen[key]).check_available()
 
 
 def _warm_up(planners: set[str], engine: Engine, say: Callable[[str], None] | None) -> None:

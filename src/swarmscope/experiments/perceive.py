@@ -12,10 +12,12 @@ import numpy as np
 from swarmscope._jit import jit
 from swarmscope.errors import ConfigError, InputFileError
 from swarmscope.onboard.body import Body
-from swarmscope.onboard.percept import PERCEPT, Rig, Scratch, Sensor, make_rig, new_scratch
 from swarmscope.onboard.perception.safety import safe_directions
-from swarmscope.onboard.sharing.message import MAX_FEATURES_BYTES, encode_features
-from swarmscope.onboard.tick import features
+from swarmscope.onboard.rig import AHEAD, Rig, make_rig
+from swarmscope.onboard.sensor import Sensor
+from swarmscope.onboard.sharing.message import MAX_FEATURES_BYTES, Head, encode_features
+from swarmscope.onboard.tick import own_features
+from swarmscope.onboard.view import Swarm, new_swarm, view_of
 from swarmscope.sim.scan_files import ScanLog
 
 REPEATS = 50
@@ -57,56 +59,37 @@ def perceive(log: ScanLog, range_m: float = 5.0, radius_m: float = 0.15, beam_st
     rig = _rig_of(log, ranges.shape[1], log.increment * beam_step, range_m, radius_m)
     ranges[ranges > rig.sensor.range_max] = np.inf
     scans, beams = ranges.shape
-    percept, scratch = np.zeros(1, PERCEPT), new_scratch(1, rig)
     safe = np.zeros((scans, beams), bool)
     filtered = np.zeros((scans, beams), np.float32)
     found: list[np.ndarray] = []
     sizes, times = np.zeros(scans, int), np.zeros(scans)
     packet = np.zeros(MAX_FEATURES_BYTES, np.uint8)
-    perceive_repeatedly(1, ranges[0], percept, scratch, rig)  # loads the kernels
+    swarm = new_swarm(1, rig)
+    perceive_repeatedly(1, swarm)  # loads the kernels
     for k in range(scans):
+        swarm.masked[0] = ranges[k]
         start = time.perf_counter_ns()
-        count = perceive_repeatedly(REPEATS, ranges[k], percept, scratch, rig)
+        count = perceive_repeatedly(REPEATS, swarm)
         times[k] = (time.perf_counter_ns() - start) / 1e3 / REPEATS
-        safe[k], filtered[k] = scratch.safe[0] == 1, scratch.filtered[0]
-        angles, distances = scratch.angles[0, 0, :count].copy(), scratch.distances[0, 0, :count].copy()
+        safe[k], filtered[k] = swarm.safe[0] == 1, swarm.filtered[0]
+        angles, distances = swarm.own.angles[0, :count].copy(), swarm.own.distances[0, :count].copy()
         found.append(np.column_stack([(angles + np.pi) % (2 * np.pi) - np.pi, distances]))
-        sizes[k] = encode_features(0, 0, 0, angles, distances, count, rig.sensor.range_max, packet)
+        sizes[k] = encode_features(Head(0, 0, 0), angles, distances, count, rig.sensor.range_max, packet)
     directions = rig.sensor.angle_min + rig.sensor.increment * np.arange(beams)
     return Perception(rig, directions, ranges, safe, filtered, found, sizes, times)
 
 
 @jit
-def perceive_repeatedly(
-    repeats: int, ranges: np.ndarray, percepts: np.ndarray, scratch: Scratch, rig: Rig
-) -> int:
-    """Run safe directions and features of one scan into row 0 of the scratch; return the number of features.
+def perceive_repeatedly(repeats: int, swarm: Swarm) -> int:
+    """Find the safe directions and features of the first robot's masked scan; return the number of features.
 
     Once is enough for the result; many times in a row give a time without the call from Python.
     """
-    sensor = rig.sensor
     count = 0
     for _ in range(repeats):
-        safe_directions(
-            ranges,
-            sensor.range_min,
-            sensor.range_max,
-            sensor.wraps,
-            rig.reach[0],
-            scratch.edges[0],
-            scratch.safe[0],
-        )
-        count = features(
-            ranges,
-            percepts[0],
-            scratch.edges[0],
-            scratch.narrow[0],
-            scratch.padded[0],
-            scratch.angles[0],
-            scratch.distances[0],
-            scratch.filtered[0],
-            rig,
-        )
+        see = view_of(swarm, 0)
+        safe_directions(see.masked, see.rig.sensor, see.rig.reach[AHEAD], see.edges, see.safe)
+        count = own_features(see)
     return count
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from swarmscope.experiments.work import make_job
-from swarmscope.onboard.planning._contract import load_planner
+from swarmscope.onboard.planners import load_planner
 from swarmscope.scenarios.read import parse_scenario
 
 
@@ -15,9 +15,7 @@ def kernels_are_cold(planner: str) -> bool:
     """Tell whether the compiled kernels of the simulator or of the planner are not on disk yet."""
     from swarmscope.sim import loop
 
-    module = load_planner(planner)
-    kernels = getattr(module, "KERNELS", (module.step_all,))
-    return _is_cold(loop.world_phase) or any(map(_is_cold, kernels))
+    return any(map(_is_cold, (loop.world_phase, *load_planner(planner).kernels)))
 
 
 def warm_up_jobs(planners: Iterable[str]) -> list[str]:

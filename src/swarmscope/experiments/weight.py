@@ -17,7 +17,7 @@ from swarmscope.experiments.experiment import Experiment, merged
 from swarmscope.experiments.seeds import seed_set
 from swarmscope.judging.run import play
 from swarmscope.judging.statistics import RESAMPLES, Interval, wilson
-from swarmscope.onboard.planning.fields import interaction_force
+from swarmscope.onboard.deciding.fields import interaction_force
 from swarmscope.scenarios.read import parse_scenario
 
 SELF_PRINTED, NEIGHBOUR_PRINTED, WEIGHT_PRINTED = 0.245, 0.446, 0.195

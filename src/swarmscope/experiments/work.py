@@ -67,9 +67,8 @@ def revision() -> str:
 
 def model_state(config: dict[str, Any]) -> str | None:
     """Return which network the scenario's planner runs, and by which version of what; None without one."""
-    planner = planner_of(PlannerModel.model_validate(config.get("planner", {})))
-    state = getattr(planner, "model_state", None)
-    return None if state is None else f"{state()} onnxruntime {installed_version('onnxruntime')}"
+    model = planner_of(PlannerModel.model_validate(config.get("planner", {}))).model
+    return None if model is None else f"{model.state()} onnxruntime {installed_version('onnxruntime')}"
 
 
 def unit_key(config: dict[str, Any]) -> str:

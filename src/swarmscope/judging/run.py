@@ -26,7 +26,8 @@ from swarmscope.judging.provenance import git_revision, versions
 from swarmscope.judging.run_folder import check_out, write_run
 from swarmscope.judging.shortest_path import any_angle_paths, grid_paths, lengths_m
 from swarmscope.judging.sides import judged_by, make_advice
-from swarmscope.onboard.planning._contract import REASON_NAMES, STATE_NAMES
+from swarmscope.onboard.planners import Planner
+from swarmscope.onboard.reasons import STATE_NAMES
 from swarmscope.scenarios.scenario import Scenario
 from swarmscope.scenarios.to_kernels import complete, make_setting, make_setup
 from swarmscope.sim.loop import Setting, Trace, run
@@ -86,11 +87,11 @@ def play(
     """Run the scenario and find the reference ways; ``progress(simulated seconds, robots done)``.
 
     ``references`` of the same world are taken as they are. The side of the shortest way is found for planners that
-    declare ``TOLD_SIDE``, and where the scenario says ``judge_sides``: then it is noted beside every choice.
+    are oracles, and where the scenario says ``judge_sides``: then it is noted beside every choice.
     """
     setup = make_setup(scenario)
     setting = make_setting(scenario, setup, threads)
-    if scenario.judge_sides or getattr(setting.planner, "TOLD_SIDE", False):
+    if scenario.judge_sides or setting.planner.told:
         setting = replace(setting, advice=make_advice(setup, *judged_by(scenario, setting.rig)))
     trace = run(setting, progress)
     if references is None:
@@ -215,10 +216,9 @@ def figures(outcome: Outcome) -> dict[str, Any]:
     return values
 
 
-def _model(planner: Any) -> dict[str, str]:
+def _model(planner: Planner) -> dict[str, str]:
     """Return which network the planner runs, nothing without one."""
-    state = getattr(planner, "model_state", None)
-    return {} if state is None else {"model_sha256": state()}
+    return {} if planner.model is None else {"model_sha256": planner.model.state()}
 
 
 def place_name(scenario: Scenario) -> str:
@@ -230,10 +230,10 @@ def place_name(scenario: Scenario) -> str:
 
 def failures(outcome: Outcome) -> list[dict[str, Any]]:
     """Name each robot that did not arrive, and why."""
-    robots, records = outcome.trace.robots, outcome.trace.records
+    robots, records, reasons = outcome.trace.robots, outcome.trace.records, outcome.setting.planner.reasons
     found = []
     for i in np.flatnonzero(~np.isfinite(robots["arrival_s"])):
-        state, reason = STATE_NAMES[records.state[-1, i]], REASON_NAMES[records.reason[-1, i]]
+        state, reason = STATE_NAMES[records.state[-1, i]], reasons[records.reason[-1, i]]
         to_go = float(np.hypot(robots["goal_x"][i] - robots["x"][i], robots["goal_y"][i] - robots["y"][i]))
         late = f"time limit in state '{state}': {reason}; {to_go:.1f} m from its goal"
         why = "collided" if robots["crashed"][i] else late
@@ -271,7 +271,7 @@ def trajectory(outcome: Outcome) -> dict[str, np.ndarray]:
         "bytes_sent": records.bytes_sent,
         "neighbours": records.neighbours,
         "state_names": np.array(STATE_NAMES),
-        "reason_names": np.array(REASON_NAMES),
+        "reason_names": np.array(outcome.setting.planner.reasons),
         "beam_angles": angles,
         "scan_u8": records.scan,
         "safe_bits": records.safe,

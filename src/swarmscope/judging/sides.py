@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from swarmscope._jit import jit_alloc as jit
 from swarmscope.judging.shortest_path import RESOLUTION_M, SNAP_CELLS
-from swarmscope.onboard.percept import Rig
+from swarmscope.onboard.rig import Rig
 from swarmscope.scenarios.scenario import Scenario
 from swarmscope.sim.advice import Advice
 from swarmscope.sim.world import compile_world

@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 
 from swarmscope._jit import jit
 from swarmscope.learning.records import Shard
-from swarmscope.onboard.perception.local_map import CELL_ANGLE, CELL_DISTANCE, CELLS, CHANNELS, draw_map
-from swarmscope.onboard.planning._giwt_graph import (
+from swarmscope.onboard.network.graph import (
     OWN_CELL,
     information_gain_series,
     position_cell,
 )
+from swarmscope.onboard.network.local_map import CELL_ANGLE, CELL_DISTANCE, CELLS, CHANNELS, Drawing, draw_map
 
 SHORTEST_M = 1.0
 """The least that a robot sees in training."""
@@ -118,7 +118,8 @@ def draw_all(
     """Draw pictures of a full circle of beams, those ``mirrored`` with left and right exchanged."""
     increment = 2.0 * np.pi / codes.shape[1]
     for e in range(scan.shape[0]):
-        draw_map(codes[scan[e]], -np.pi, increment, target[e], radius_m, seen_m[e], cell_angle, cell_distance, out[e])
+        drawing = Drawing(-np.pi, increment, target[e], radius_m, seen_m[e])
+        draw_map(codes[scan[e]], drawing, cell_angle, cell_distance, out[e])
         if mirrored[e]:
             for channel in range(out.shape[1]):
                 for row in range(out.shape[2] // 2):

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarmscope.learning.records import Shard
-from swarmscope.onboard.perception.local_map import CODE_STEP_M, NOTHING, UNKNOWN
+from swarmscope.onboard.network.local_map import CODE_STEP_M, NOTHING, UNKNOWN
 
 SHARES = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
 MOST = 60_000

@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from swarmscope.errors import ConfigError, InputFileError
 from swarmscope.learning.generate import DRIVEN, PLACED, parse_set
-from swarmscope.onboard.planning._giwt_network import VIEWS_M
+from swarmscope.onboard.network.model import VIEWS_M
 
 FOLDER = Path(__file__).parent.parent / "data" / "training"
 Count = Annotated[int, Field(ge=1)]

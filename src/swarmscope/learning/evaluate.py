@@ -23,7 +23,7 @@ from swarmscope.learning.config import TrainingConfig, parse_config
 from swarmscope.learning.models import Chooser
 from swarmscope.learning.records import SPLITS, Shard, content_key, load, read_manifest, select, split_of
 from swarmscope.learning.train import BEST, decide, encode, place, set_up, view_of
-from swarmscope.onboard.planning._giwt_graph import quantise, restore
+from swarmscope.onboard.network.graph import quantise, restore
 
 RESAMPLES = 2000
 

@@ -1,4 +1,4 @@
-"""From a checkpoint to what a robot runs: two ONNX files and ``model.json`` (read by planning/_giwt_network.py).
+"""From a checkpoint to what a robot runs: two ONNX files and ``model.json`` (read by network/model.py).
 
 The encoder runs on every robot for itself, the decider on the one that decides. The graph layers of PyTorch Geometric
 are written out for a star of at most K robots, which ONNX Runtime can run; that this is the same is checked for every
@@ -24,9 +24,9 @@ from swarmscope.learning.checkpoints import Checkpoint, read, restore_model, sha
 from swarmscope.learning.config import parse_config
 from swarmscope.learning.models import FAR_BELOW, SLOPE, Chooser, Peer
 from swarmscope.learning.records import write_atomically
-from swarmscope.onboard.perception.local_map import CELLS, CHANNELS
-from swarmscope.onboard.planning._giwt_graph import FEATURES, GRID, OWN_CELL
-from swarmscope.onboard.planning._giwt_network import CARD, DECIDER, ENCODER, FORMAT, VERSION
+from swarmscope.onboard.network.graph import FEATURES, GRID, OWN_CELL
+from swarmscope.onboard.network.local_map import CELLS, CHANNELS
+from swarmscope.onboard.network.model import CARD, DECIDER, ENCODER, FORMAT, VERSION
 
 OPSET = 18
 CLOSE = 1e-4

@@ -28,8 +28,8 @@ import torch
 from torch import Tensor, nn
 from torch_geometric.nn import GATConv, SAGEConv
 
-from swarmscope.onboard.perception.local_map import CELLS, CHANNELS
-from swarmscope.onboard.planning._giwt_graph import FEATURES, GRID
+from swarmscope.onboard.network.graph import FEATURES, GRID
+from swarmscope.onboard.network.local_map import CELLS, CHANNELS
 
 Network = Literal["giwt", "gat", "graphsage", "cnn"]
 NETWORKS: tuple[Network, ...] = ("giwt", "gat", "graphsage", "cnn")

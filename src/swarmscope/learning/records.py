@@ -28,7 +28,7 @@ FORMAT = "swarmscope-giwt-data"
 VERSION = 1
 MANIFEST = "manifest.json"
 SCHEMA: dict[str, tuple[str, int]] = {
-    "codes": ("uint8", 2),  # (S, M) scans as range codes (onboard/perception/local_map.py), body frame
+    "codes": ("uint8", 2),  # (S, M) scans as range codes (onboard/network/local_map.py), body frame
     "node_scan": ("int32", 1),  # (E,) which scan a robot of a sample has
     "node_target": ("float32", 1),  # (E,) the decider's target direction in that scan's frame [rad]
     "node_x": ("float32", 1),  # (E,) its place in the decider's target frame [m]; 0 for the decider

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, field, fields, replace
 from functools import lru_cache
 from typing import Any, Literal, NamedTuple
 
@@ -23,10 +23,12 @@ from numpy.typing import NDArray
 from swarmscope.judging.sides import judged_by
 from swarmscope.learning.labels import LABELLED, OUTCOMES, Label, label
 from swarmscope.learning.views import look
-from swarmscope.onboard.percept import Rig
-from swarmscope.onboard.perception.local_map import encode_scan, hide_robot
+from swarmscope.onboard.network.answering import look as look_round
+from swarmscope.onboard.network.graph import GRID_M
+from swarmscope.onboard.planners import Planner, load_planner
 from swarmscope.onboard.planning import dh_bug
-from swarmscope.onboard.planning._giwt_graph import GRID_M
+from swarmscope.onboard.rig import Rig
+from swarmscope.onboard.view import Swarm
 from swarmscope.scenarios.read import parse_scenario
 from swarmscope.scenarios.scenario import Scenario
 from swarmscope.scenarios.to_kernels import make_rig_of, make_setting
@@ -170,11 +172,11 @@ def turned(vector: Floats, target: float) -> tuple[float, float]:
 
 def _driven(rng: np.random.Generator, options: MapOptions, task: str, counts: Counts) -> Iterator[Sample]:
     """Yield the key points of one run of DH-Bug."""
-    scenario, _, rig, keeps_off, horizon = robot()
+    scenario, _, _, keeps_off, horizon = robot()
     setup = _setup(rng, options, task)
     if setup is None:
         return
-    recorder = Recorder(rig)
+    recorder = _recorder()
     seed, turn = int(rng.integers(2**31)), int(rng.choice([dh_bug.TURN_RANDOM, dh_bug.TURN_NEAREST]))
     params = dh_bug.Params(turn=turn, seed=int(rng.integers(2**31)), long_gaps=1)
     setting = make_setting(scenario, setup)
@@ -205,40 +207,37 @@ def _setup(rng: np.random.Generator, options: MapOptions, task: str) -> Setup | 
         return None
 
 
-class Recorder:
+@dataclass(frozen=True)
+class Recorder(Planner):
     """DH-Bug as a planner that notes what is seen at its key points, in the order of the log of choices."""
 
-    Params, new_memory = dh_bug.Params, staticmethod(dh_bug.new_memory)
+    key_points: list[list[Node]] = field(default_factory=list)
 
-    def __init__(self, rig: Rig) -> None:
-        self.key_points: list[list[Node]] = []
-        self._rig = rig
-
-    def step_all(self, first: int, last: int, ranges: Any, percepts: Any, shared: Any, *rest: Any) -> None:
+    def step_all(self, first: int, last: int, swarm: Swarm, memories: Any, params: Any) -> None:
         """Run one tick of robots ``first`` to ``last - 1``."""
-        dh_bug.step_all(first, last, ranges, percepts, shared, *rest)
-        decisions = rest[1]
-        for i in np.flatnonzero(decisions["fused"][first:last]) + first:
-            self.key_points.append(self._nodes(ranges, percepts, int(i)))
+        super().step_all(first, last, swarm, memories, params)
+        for i in np.flatnonzero(swarm.decisions["fused"][first:last]) + first:
+            self.key_points.append(_nodes(swarm, int(i)))
 
-    def _nodes(self, ranges: Any, percepts: Any, i: int) -> list[Node]:
-        own = percepts[i]
-        target = float(own["goal_bearing"])
-        nodes = [Node(self._codes(ranges, percepts, i), target, 0.0, 0.0)]
-        for k in range(own["n_neighbours"]):
-            place = np.array([own["neighbour_x"][k], own["neighbour_y"][k]])
-            if math.hypot(*place) <= GRID_M:
-                codes = self._codes(ranges, percepts, int(own["neighbour_id"][k]))
-                nodes.append(Node(codes, target - float(own["neighbour_yaw"][k]), *turned(place, target)))
-        return nodes
 
-    def _codes(self, ranges: Any, percepts: Any, i: int) -> NDArray[np.uint8]:
-        sensor, percept = self._rig.sensor, percepts[i]
-        codes = np.zeros(sensor.beams, np.uint8)
-        encode_scan(ranges[i], codes)
-        for k in range(percept["n_neighbours"]):
-            hide_robot(
-                codes, sensor.angle_min, sensor.increment, sensor.wraps,
-                percept["neighbour_x"][k], percept["neighbour_y"][k], self._rig.body.radius_m,
-            )  # fmt: skip
-        return codes
+def _recorder() -> Recorder:
+    bug = load_planner("dh-bug")
+    return Recorder(*(getattr(bug, item.name) for item in fields(bug)))
+
+
+def _nodes(swarm: Swarm, i: int) -> list[Node]:
+    own = swarm.percepts[i]
+    target = float(own["goal_bearing"])
+    nodes = [Node(_codes(swarm, i), target, 0.0, 0.0)]
+    for k in range(own["n_neighbours"]):
+        place = np.array([own["neighbour_x"][k], own["neighbour_y"][k]])
+        if math.hypot(*place) <= GRID_M:
+            codes = _codes(swarm, int(own["neighbour_id"][k]))
+            nodes.append(Node(codes, target - float(own["neighbour_yaw"][k]), *turned(place, target)))
+    return nodes
+
+
+def _codes(swarm: Swarm, i: int) -> NDArray[np.uint8]:
+    codes = np.zeros(swarm.rig.sensor.beams, np.uint8)
+    look_round(i, swarm, codes)
+    return codes

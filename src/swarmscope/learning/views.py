@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarmscope._jit import jit, jit_inner
-from swarmscope.onboard.percept import Rig, Sensor
-from swarmscope.onboard.perception.local_map import encode_scan, hide_robot
+from swarmscope.onboard.network.graph import GRID_M
+from swarmscope.onboard.network.local_map import encode_scan, hide_robot
 from swarmscope.onboard.perception.safety import beam_of, safe_directions
-from swarmscope.onboard.planning._giwt_graph import GRID_M
-from swarmscope.onboard.planning.dh_bug import SECTOR_RULE
+from swarmscope.onboard.rig import PRINTED, Rig
+from swarmscope.onboard.sensor import Sensor
 from swarmscope.sim.lidar import Beams, cast_disc, cast_static
 from swarmscope.sim.sensing import SIGHT_SLACK
 from swarmscope.sim.world import World
@@ -59,9 +59,9 @@ def _look(
     for i in range(places.shape[0]):
         x, y = places[i, 0], places[i, 1]
         cast_static(world, x, y, 0.0, beams, ranges)
-        safe_directions(ranges, sensor.range_min, sensor.range_max, sensor.wraps, rig.reach[SECTOR_RULE], edges, safe)
+        safe_directions(ranges, sensor, rig.reach[PRINTED], edges, safe)
         bearing = math.atan2(goals[i, 1] - y, goals[i, 0] - x)
-        ahead = beam_of(bearing, sensor.angle_min, sensor.increment, sensor.beams, sensor.wraps)
+        ahead = beam_of(bearing, sensor)
         blocked[i] = safe[ahead] == 0
         for j in range(places.shape[0]):
             if j != i:
@@ -70,13 +70,12 @@ def _look(
         for j in range(places.shape[0]):
             if j != i and _in_sight(ranges, sensor, places[j, 0] - x, places[j, 1] - y, radius):
                 sees[i, j] = True
-                hide_robot(codes[i], sensor.angle_min, sensor.increment, sensor.wraps,
-                           places[j, 0] - x, places[j, 1] - y, radius)  # fmt: skip
+                hide_robot(codes[i], sensor, places[j, 0] - x, places[j, 1] - y, radius)
 
 
 @jit_inner
 def _in_sight(ranges: np.ndarray, sensor: Sensor, dx: float, dy: float, radius: float) -> bool:
     """Tell whether a robot at (dx, dy) is within GRID_M and the beam towards it ends at its surface."""
     distance = math.sqrt(dx * dx + dy * dy)
-    n = beam_of(math.atan2(dy, dx), sensor.angle_min, sensor.increment, sensor.beams, sensor.wraps)
+    n = beam_of(math.atan2(dy, dx), sensor)
     return bool(distance <= GRID_M and ranges[n] >= distance - radius - SIGHT_SLACK)

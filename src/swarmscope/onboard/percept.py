@@ -7,13 +7,10 @@ without the radio. *Body frame*: x forward, y left. *Compass frame*: x east, y n
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
-from swarmscope.onboard.body import Body, Protection, protection_model
-from swarmscope.onboard.perception.filters import feature_filter, window_half
-from swarmscope.onboard.perception.safety import reach_table
 from swarmscope.onboard.sharing.message import MAX_FEATURES, MAX_PACKET_BYTES
 
 Row: TypeAlias = Any
@@ -45,7 +42,6 @@ PERCEPT = np.dtype(
         ("n_packets", np.int64),
         ("packet_length", np.int64, MAX_INBOX),
         ("packet", np.uint8, (MAX_INBOX, MAX_PACKET_BYTES)),
-        ("told_side", np.int8),  # side that the shortest way takes, +1 left, -1 right: oracles only, 0 on a robot
     ]
 )
 PEERS = 10
@@ -118,143 +114,6 @@ SHARED = np.dtype(
         ("y", np.float64),
     ]
 )
-
-
-class Sensor(NamedTuple):
-    """The LiDAR and the positioning sensor as the robot knows them. Beam n: ``angle_min + n * increment`` [rad]."""
-
-    beams: int
-    angle_min: float
-    increment: float
-    wraps: bool
-    """Whether the last beam is the first one's neighbour (full circle)."""
-    range_min: float
-    range_max: float
-    range_sigma: float
-    """Standard deviation of a LiDAR range as a fraction of it."""
-    position_sigma: float
-    """Standard deviation of a neighbour's measured position as a fraction of its distance."""
-
-
-class Rig(NamedTuple):
-    """Everything constant that a robot's kernels need: body, protection model, sensor, tables."""
-
-    body: Body
-    protection: Protection
-    sensor: Sensor
-    half: int
-    """alpha/2 in beams."""
-    footprint: float
-    """Radius that is swept: the body's plus a clearance [m]."""
-    clearance: float
-    """Kept free around the body by the guard [m]."""
-    latency: float
-    """Age of a scan when its command takes effect [s]."""
-    persistence: float
-    """How long an unseen neighbour is remembered [s]."""
-    max_feature_age: float
-    """Features older than this are not used [s]."""
-    exact_features: bool
-    """Send float32 features instead of quantised ones (to measure what quantisation costs)."""
-    look_ahead: float
-    """Directions are free of obstacles up to here [m]."""
-    reach: np.ndarray
-    """(4, BINS + 2) int16: what a return blocks, for the safe directions, the narrow gaps, the escape, and by the
-    printed rule (3), which masks the features."""
-    cos: np.ndarray
-    sin: np.ndarray
-    taps: np.ndarray
-
-
-class Scratch(NamedTuple):
-    """Working arrays, one row per robot."""
-
-    work: np.ndarray
-    """(N, M) float32: the scan without moving neighbours."""
-    filtered: np.ndarray
-    """(N, M) float32: the filtered scan."""
-    padded: np.ndarray
-    """(N, M + 2 half) float32."""
-    edges: np.ndarray
-    """(N, M + 1) int16."""
-    safe: np.ndarray
-    """(N, M) uint8."""
-    narrow: np.ndarray
-    """(N, M) uint8."""
-    angles: np.ndarray
-    """(N, 2, MAX_FEATURES) float64."""
-    distances: np.ndarray
-    """(N, 2, MAX_FEATURES) float64."""
-    header: np.ndarray
-    """(N, 5) int64."""
-
-
-def make_rig(
-    body: Body,
-    sensor: Sensor,
-    *,
-    footprint_clearance: float = 0.03,
-    clearance: float = 0.02,
-    latency: float = 0.0,
-    persistence: float = 2.0,
-    max_feature_age: float = 1.5,
-    exact_features: bool = False,
-    sector: bool = False,
-    look_ahead: float = 2.0,
-    margin: float = 0.04,
-    narrow: float = 1.2,
-) -> Rig:
-    """Return the constants of a robot with ``body`` and ``sensor``; raises ConfigError for an impossible body.
-
-    ``sector`` uses the printed rule (3) within l_th; ``look_ahead`` [m] is how far ahead directions must keep
-    ``margin`` [m] from everything, ``narrow`` [m] how far ahead a gap must be free that the body just fits.
-    """
-    protection = protection_model(body)
-    half = window_half(protection.alpha, sensor.increment)
-    angles = sensor.angle_min + sensor.increment * np.arange(sensor.beams)
-    footprint = body.radius_m + footprint_clearance
-    half_alpha = 0.5 * protection.alpha if sector else 0.0
-    rules = (
-        (protection.l_th, half_alpha, look_ahead, body.radius_m + margin),
-        (narrow or protection.r, 0.0, 0.0, 0.0),
-        (protection.r, 0.0, 0.0, 0.0),
-        (protection.l_th, 0.5 * protection.alpha, 0.0, 0.0),
-        (protection.l_th, 0.0, 0.0, 0.0),
-    )
-    reach = np.stack([reach_table(sensor.increment, sensor.range_max, footprint, *rule) for rule in rules])
-    return Rig(
-        look_ahead=look_ahead,
-        reach=reach,
-        body=Body(*(float(v) for v in body)),
-        protection=protection,
-        sensor=sensor,
-        half=half,
-        footprint=footprint,
-        clearance=clearance,
-        latency=latency,
-        persistence=persistence,
-        max_feature_age=max_feature_age,
-        exact_features=exact_features,
-        cos=np.cos(angles),
-        sin=np.sin(angles),
-        taps=feature_filter(half),
-    )
-
-
-def new_scratch(robots: int, rig: Rig) -> Scratch:
-    """Return the working arrays of ``robots`` robots."""
-    beams = rig.sensor.beams
-    return Scratch(
-        work=np.zeros((robots, beams), np.float32),
-        filtered=np.zeros((robots, beams), np.float32),
-        padded=np.zeros((robots, beams + 2 * rig.half), np.float32),
-        edges=np.zeros((robots, beams + 1), np.int16),
-        safe=np.zeros((robots, beams), np.uint8),
-        narrow=np.zeros((robots, beams), np.uint8),
-        angles=np.zeros((robots, 2, MAX_FEATURES)),
-        distances=np.zeros((robots, 2, MAX_FEATURES)),
-        header=np.zeros((robots, 5), np.int64),
-    )
 
 
 def new_shared(robots: int) -> np.ndarray:

@@ -1,87 +1,74 @@
-"""One tick of a robot, from scan to command: what every planner shares before and after its own decision."""
+"""One tick of a robot, from scan to command: the chain that every planner's decision stands in.
+
+perceive (packets, poses, scan, safe directions) -> share (own features, answers) -> decide -> guard.
+"""
 
 from __future__ import annotations
 
-import numpy as np
-
 from swarmscope._jit import jit
 from swarmscope.onboard.control.guard import guard
-from swarmscope.onboard.percept import Rig, Row
 from swarmscope.onboard.perception.features import align_features, extrema
 from swarmscope.onboard.perception.filters import filter_padded, prepare_scan
 from swarmscope.onboard.perception.safety import safe_directions
-from swarmscope.onboard.sharing.inbox import read_inbox
+from swarmscope.onboard.rig import AHEAD, PRINTED
+from swarmscope.onboard.sharing.inbox import answer_all, read_inbox
 from swarmscope.onboard.sharing.tracks import mask_moving_neighbours, update_odometry, update_tracks
+from swarmscope.onboard.view import Swarm, View, view_of
 
 
 @jit
-def begin(
-    ranges: np.ndarray,
-    percept: Row,
-    shared: Row,
-    decision: Row,
-    work: np.ndarray,
-    edges: np.ndarray,
-    safe: np.ndarray,
-    header: np.ndarray,
-    angles: np.ndarray,
-    distances: np.ndarray,
-    rig: Rig,
-    still_s: float,
-) -> int:
-    """Take in packets, poses and scan; return the number of safe directions.
+def perceive(see: View, still_s: float) -> None:
+    """Take in packets, poses and scan: fill ``see.masked`` and ``see.safe``.
 
-    Afterwards ``work (M,)`` is the scan without moving neighbours and ``safe (M,)`` its safe directions.
+    A neighbour that has not moved for ``still_s`` [s] stays in the scan: it is an obstacle.
     """
-    decision["n_out"] = 0
-    decision["fused"] = 0
-    dx, dy = update_odometry(percept, shared)
-    read_inbox(percept, shared, rig, header, angles[1], distances[1])
-    update_tracks(percept, shared, rig, dx, dy)
-    mask_moving_neighbours(ranges, percept, shared, rig, still_s, work)
-    sensor = rig.sensor
-    return safe_directions(
-        work, sensor.range_min, sensor.range_max, sensor.wraps, rig.reach[0], edges, safe
-    )
+    see.out["n_out"] = 0
+    see.out["fused"] = 0
+    dx, dy = update_odometry(see.percept, see.shared)
+    read_inbox(see)
+    update_tracks(see.percept, see.shared, see.rig, dx, dy)
+    mask_moving_neighbours(see, still_s)
+    safe_directions(see.masked, see.rig.sensor, see.rig.reach[AHEAD], see.edges, see.safe)
 
 
 @jit
-def features(
-    work: np.ndarray,
-    percept: Row,
-    edges: np.ndarray,
-    mask: np.ndarray,
-    padded: np.ndarray,
-    angles: np.ndarray,
-    distances: np.ndarray,
-    filtered: np.ndarray,
-    rig: Rig,
-) -> int:
-    """Compute our features (7) of the scan ``work`` into row 0, compass frame; return how many.
+def share(see: View, wanted: bool) -> int:
+    """Compute our own features where they are ``wanted`` or asked for; answer everybody who asked.
 
-    ``edges``, ``mask (M,)`` are scratch. The mask is the printed rule (3): the look-ahead would hide whatever is near.
+    Return how many there are in ``see.own``, -1 when they were not computed.
     """
-    sensor = rig.sensor
-    safe_directions(work, sensor.range_min, sensor.range_max, sensor.wraps, rig.reach[3], edges, mask)
-    prepare_scan(work, sensor.range_min, sensor.range_max, sensor.wraps, rig.half, padded)
-    filter_padded(padded, rig.taps, sensor.range_max, filtered)
-    count = extrema(
-        filtered,
-        mask,
-        sensor.angle_min,
-        sensor.increment,
-        sensor.wraps,
-        sensor.range_max,
-        angles[1],
-        distances[1],
-    )
-    align_features(angles[1], distances[1], count, percept["compass"], angles[0], distances[0])
+    asked = see.shared["ask_n"] > 0
+    count = own_features(see) if wanted or asked else -1
+    if asked:
+        answer_all(see, count)
     return count
 
 
 @jit
-def finish(
-    ranges: np.ndarray, percept: Row, shared: Row, decision: Row, edges: np.ndarray, rig: Rig
-) -> None:
-    """Let the guard have the last word."""
-    guard(ranges, percept, shared, decision, edges, rig)
+def own_features(see: View) -> int:
+    """Compute our features (7) of the masked scan into ``see.own``, compass frame; return how many.
+
+    Their mask is the printed rule (3): the look-ahead would hide whatever is near.
+    """
+    sensor = see.rig.sensor
+    safe_directions(see.masked, sensor, see.rig.reach[PRINTED], see.edges, see.narrow)
+    prepare_scan(see.masked, sensor.range_min, sensor.range_max, sensor.wraps, see.rig.half, see.padded)
+    filter_padded(see.padded, see.rig.taps, sensor.range_max, see.filtered)
+    count = extrema(see.filtered, see.narrow, sensor, see.other.angles, see.other.distances)
+    own, raw = see.own, see.other
+    align_features(raw.angles, raw.distances, count, see.percept["compass"], own.angles, own.distances)
+    return count
+
+
+@jit
+def perceive_all(first: int, last: int, swarm: Swarm, still_s: float) -> None:
+    """Let robots ``first`` to ``last - 1`` perceive."""
+    for i in range(first, last):
+        perceive(view_of(swarm, i), still_s)
+
+
+@jit
+def guard_all(first: int, last: int, swarm: Swarm) -> None:
+    """Let the guard have the last word on the commands of robots ``first`` to ``last - 1``."""
+    for i in range(first, last):
+        guard(view_of(swarm, i))

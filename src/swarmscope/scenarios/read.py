@@ -9,7 +9,7 @@ import yaml
 from pydantic import ValidationError
 
 from swarmscope.errors import ConfigError, InputFileError, UnknownNameError, nearest_hint
-from swarmscope.onboard.planning._contract import load_planner, planner_names
+from swarmscope.onboard.planners import load_planner, planner_names
 from swarmscope.scenarios.scenario import Scenario
 from swarmscope.sim.maps import packaged_map
 from swarmscope.tasks._contract import task_names
@@ -27,7 +27,7 @@ def parse_scenario(values: Any, where: str) -> Scenario:
         raise UnknownNameError("task", scenario.task.name, task_names(), f"{where}: task.name")
     if scenario.planner.name not in planner_names():
         raise UnknownNameError("planner", scenario.planner.name, planner_names(), f"{where}: planner.name")
-    if scenario.planner.model is not None and not hasattr(load_planner(scenario.planner.name), "with_model"):
+    if scenario.planner.model is not None and load_planner(scenario.planner.name).model is None:
         raise ConfigError(f"{where}: planner.model", f"planner '{scenario.planner.name}' runs no network")
     return scenario
 

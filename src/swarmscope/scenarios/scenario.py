@@ -1,18 +1,18 @@
 """The schema of a scenario: one file that describes one run completely, validated.
 
-A default that the kernels have, too, is taken from there: ``Body``, ``Noise``, ``Radio``, ``make_rig``, ``Setting``.
+A default that the kernels have, too, is taken from there: ``Body``, ``Noise``, ``Radio``, ``Guarding``, ``Safety``, ``Setting``.
 The text after a field is its meaning, with the unit in brackets; docs/scenario.md and ``swarmscope config`` print it.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Final, Literal, Self
+from typing import Annotated, Final, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from swarmscope.onboard.body import Body
-from swarmscope.onboard.percept import make_rig
+from swarmscope.onboard.rig import Guarding, Safety, Sharing
 from swarmscope.sim.loop import Setting
 from swarmscope.sim.state import Noise, Radio
 from swarmscope.sim.world import WorldSpec
@@ -24,11 +24,10 @@ NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 BODY: Final = Body()
 NOISE: Final = Noise()
 RADIO: Final = Radio()
-RIG: Final[dict[str, Any]] = {
-    key if isinstance(value, bool) else f"{key}_s" if key == "persistence" else f"{key}_m": value
-    for key, value in (make_rig.__kwdefaults__ or {}).items()
-}
-"""What robots run on when nobody says otherwise, by the keys of a scenario."""
+GUARDING: Final = Guarding()
+SAFETY: Final = Safety()
+SHARING: Final = Sharing()
+"""What robots run on when nobody says otherwise."""
 
 
 class _Strict(BaseModel):
@@ -93,31 +92,31 @@ class RadioModel(_Strict):
     """Share of packets that are lost by chance."""
     bitrate_bps: Positive = RADIO.bitrate_bps
     """Bandwidth of a robot's radio: a packet occupies sender and receiver for its bits over this [bit/s]."""
-    exact_features: bool = RIG["exact_features"]
+    exact_features: bool = SHARING.exact_features
     """Send features as float32 instead of bytes (to measure what quantisation costs)."""
 
 
 class GuardModel(_Strict):
     """Distances kept free around the body."""
 
-    clearance_m: NotNegative = RIG["clearance_m"]
+    clearance_m: NotNegative = GUARDING.clearance_m
     """Kept free around the body by the guard, which slows down or stops [m]."""
-    footprint_clearance_m: NotNegative = RIG["footprint_clearance_m"]
+    footprint_clearance_m: NotNegative = GUARDING.footprint_clearance_m
     """Added to the radius where ways are planned: directions that the widened body can take are safe [m]."""
-    persistence_s: NotNegative = RIG["persistence_s"]
+    persistence_s: NotNegative = GUARDING.persistence_s
     """How long a neighbour that is out of sight is remembered [s]."""
 
 
 class SafetyModel(_Strict):
     """Which directions are safe (theory.md); ``sector: true, look_ahead_m: 0`` is the printed rule."""
 
-    sector: bool = RIG["sector"]
+    sector: bool = SAFETY.sector
     """Demand a free sector as wide as the scope angle within the planning distance l_th, as printed (3)."""
-    look_ahead_m: NotNegative = RIG["look_ahead_m"]
+    look_ahead_m: NotNegative = SAFETY.look_ahead_m
     """How far ahead a direction must be free; 0 leaves it at l_th [m]."""
-    margin_m: NotNegative = RIG["margin_m"]
+    margin_m: NotNegative = SAFETY.margin_m
     """Kept on both sides of the body within ``look_ahead_m`` [m]."""
-    narrow_m: NotNegative = RIG["narrow_m"]
+    narrow_m: NotNegative = SAFETY.narrow_m
     """How far ahead a gap must be free that the body just fits, when no direction is safe; 0 is r [m]."""
 
 

@@ -11,8 +11,9 @@ import numpy as np
 
 from swarmscope.errors import ConfigError
 from swarmscope.onboard.body import Body
-from swarmscope.onboard.percept import Rig, Sensor, make_rig
-from swarmscope.onboard.planning._contract import load_planner, make_params
+from swarmscope.onboard.planners import Planner, load_planner
+from swarmscope.onboard.rig import Guarding, Rig, Safety, Sharing, make_rig
+from swarmscope.onboard.sensor import Sensor
 from swarmscope.scenarios.read import is_packaged, map_path
 from swarmscope.scenarios.scenario import NoiseModel, PlannerModel, Scenario
 from swarmscope.sim.lidar import make_beams
@@ -48,7 +49,7 @@ def complete(scenario: Scenario) -> dict[str, Any]:
     """Return the scenario as plain values, every default written out; ``parse_scenario`` reads it back."""
     planner = load_planner(scenario.planner.name)
     values = scenario.model_dump(mode="json", exclude_none=True)
-    values["planner"]["params"] = make_params(planner, scenario.planner.params)._asdict()
+    values["planner"]["params"] = planner.settings(scenario.planner.params)
     if scenario.task is not None:
         values["task"]["options"] = task_options(load_task(scenario.task.name)) | scenario.task.options
     if scenario.planner.model is not None:
@@ -88,22 +89,18 @@ def make_rig_of(scenario: Scenario) -> Rig:
         position_sigma=math.hypot(noise.range_fraction, math.radians(noise.bearing_deg)),
     )
     body = Body(**robot.model_dump())
+    guard, safety = scenario.guard, scenario.safety
     return make_rig(
         body,
         sensor,
-        footprint_clearance=scenario.guard.footprint_clearance_m,
-        clearance=scenario.guard.clearance_m,
-        persistence=scenario.guard.persistence_s,
-        exact_features=scenario.radio.exact_features,
-        sector=scenario.safety.sector,
-        look_ahead=scenario.safety.look_ahead_m,
-        margin=scenario.safety.margin_m,
-        narrow=scenario.safety.narrow_m,
+        Guarding(**guard.model_dump()),
+        Safety(**safety.model_dump()),
+        Sharing(exact_features=scenario.radio.exact_features),
     )
 
 
-def planner_of(chosen: PlannerModel) -> Any:
-    """Return the planner's module, or the planner with the model that is named instead of its own."""
+def planner_of(chosen: PlannerModel) -> Planner:
+    """Return the planner, or the planner with the model that is named instead of its own."""
     planner = load_planner(chosen.name)
     return planner if chosen.model is None else planner.with_model(chosen.model)
 
@@ -138,7 +135,7 @@ def make_setting(scenario: Scenario, setup: Setup, threads: int = 1) -> Setting:
         beams=make_beams(scenario.lidar.beams, math.radians(scenario.lidar.fov_deg), scenario.lidar.range_m),
         rig=make_rig_of(scenario),
         planner=planner,
-        params=_with_run_seed(make_params(planner, scenario.planner.params), scenario.seed),
+        params=_with_run_seed(planner.params(scenario.planner.params), scenario.seed),
         noise=_noise_of(scenario.noise),
         radio=Radio(**scenario.radio.model_dump(exclude={"exact_features"})),
         seed=scenario.seed,

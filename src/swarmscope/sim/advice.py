@@ -37,10 +37,10 @@ class Advice(NamedTuple):
 
 @jit
 def tell_sides(sim: Sim, advice: Advice) -> None:
-    """Write ``told_side`` into every robot's percept."""
+    """Write the side of every robot's shortest way into ``sim.told``."""
     for i in range(sim.robots.size):
         robot = sim.robots[i]
-        sim.percepts[i]["told_side"] = side_of_way(
+        sim.told[i] = side_of_way(
             advice.cost[advice.goal_of[i]],
             (robot["x"] - advice.x0) / advice.resolution,
             (robot["y"] - advice.y0) / advice.resolution,

@@ -14,14 +14,17 @@ from typing import Any
 import numpy as np
 
 from swarmscope._jit import jit, jit_inner
-from swarmscope.onboard.percept import Rig
+from swarmscope.onboard.planners import Planner
+from swarmscope.onboard.reasons import CRASHED, R_COLLIDED
+from swarmscope.onboard.rig import Rig
+from swarmscope.onboard.view import Swarm, arrays_of
 from swarmscope.sim.advice import Advice, tell_sides
 from swarmscope.sim.cells import index_robots
 from swarmscope.sim.lidar import Beams
 from swarmscope.sim.motion import judge, move
 from swarmscope.sim.radio import exchange
 from swarmscope.sim.sensing import sense
-from swarmscope.sim.state import CHOICES, Clock, Noise, Radio, Records, Sim, new_records, new_sim
+from swarmscope.sim.state import CHOICES, Clock, Noise, Radio, Records, Sim, Start, new_records, new_sim
 from swarmscope.sim.world import World
 
 CHUNK = 256
@@ -40,8 +43,7 @@ class Setting:
     goals: np.ndarray
     beams: Beams
     rig: Rig
-    planner: Any
-    """A planner's module, or what its ``with_model`` returned."""
+    planner: Planner
     params: Any
     noise: Noise = field(default_factory=Noise)
     radio: Radio = field(default_factory=Radio)
@@ -85,8 +87,8 @@ def record_tick(sim: Sim, safe: np.ndarray, records: Records, row: int, with_sca
         records.speed[row, i] = robot["v"]
         records.clearance[row, i] = robot["clearance"]
         records.p_left[row, i] = decision["p_left"]
-        records.state[row, i] = 6 if robot["crashed"] else decision["state"]
-        records.reason[row, i] = 13 if robot["crashed"] else decision["reason"]
+        records.state[row, i] = CRASHED if robot["crashed"] else decision["state"]
+        records.reason[row, i] = R_COLLIDED if robot["crashed"] else decision["reason"]
         records.side[row, i] = decision["side"]
         records.neighbours[row, i] = sim.percepts[i]["n_neighbours"]
         records.bytes_sent[row, i] = robot["bytes"]
@@ -114,7 +116,7 @@ def _log_choices(sim: Sim) -> None:
         choice["target"] = math.atan2(robot["goal_y"] - robot["y"], robot["goal_x"] - robot["x"])
         choice["p_self"], choice["p_left"] = decision["p_self"], decision["p_left"]
         choice["side"] = decision["side"]
-        choice["told_side"] = percept["told_side"]
+        choice["told_side"] = sim.told[i]
         choice["heard"] = decision["heard"]
         for k in range(decision["heard"]):
             choice["heard_id"][k], choice["heard_side"][k] = decision["heard_id"][k], decision["heard_side"][k]
@@ -157,21 +159,11 @@ def run(setting: Setting, progress: Callable[[float, int], None] | None = None) 
     are keyed, and what robots do to each other (radio, contacts) happens in the order of the robots.
     """
     clock = Clock(int(setting.seed), float(setting.dt), int(setting.substeps))
-    sim, shared, scratch = new_sim(
-        setting.world,
-        setting.bounds,
-        setting.beams,
-        setting.rig,
-        setting.starts,
-        setting.goals,
-        setting.noise,
-        setting.radio,
-        clock,
-    )
+    start = Start(setting.starts, setting.goals, setting.bounds)
+    sim, swarm = new_sim(setting.world, setting.beams, setting.rig, start, (setting.noise, setting.radio), clock)
     n = len(setting.starts)
     memory = setting.planner.new_memory(n)
-    step_all = setting.planner.step_all
-    arguments = (sim.ranges, sim.percepts, shared, memory, sim.decisions, scratch, setting.rig, setting.params)
+    step_all = partial(_step, setting, swarm, memory)
     beams = setting.rig.sensor.beams if setting.record_scans else 0
     ticks = math.ceil(setting.limit_s / setting.dt - 1e-9)
     chunks: list[Records] = []
@@ -179,7 +171,7 @@ def run(setting: Setting, progress: Callable[[float, int], None] | None = None) 
     plan_us: list[float] = []
     sample_every = max(1, ticks // PLAN_SAMPLES)
     index_robots(sim)
-    step_all(0, 0, *arguments)  # loads the kernels, so that no step's time contains that
+    step_all(0, 0)  # loads the kernels, so that no step's time contains that
     begun = time.perf_counter()
     pool.each(lambda a, b: sense(sim, 0, a, b))
     tick, done = 0, False
@@ -189,14 +181,16 @@ def run(setting: Setting, progress: Callable[[float, int], None] | None = None) 
             chunks.append(new_records(min(CHUNK, ticks - tick), n, beams))
         if setting.advice is not None:
             tell_sides(sim, setting.advice)
+            if setting.planner.is_told:
+                memory["told"] = sim.told
         if tick % sample_every == 0:
-            plan_us += _time_steps(step_all, arguments, n)
+            plan_us += _time_steps(step_all, n)
         else:
-            pool.each(lambda a, b: step_all(a, b, *arguments))
+            pool.each(step_all)
         if pool.size == 1:
-            done = world_phase(sim, scratch.safe, chunks[-1], row, beams > 0, tick)
+            done = world_phase(sim, swarm.safe, chunks[-1], row, beams > 0, tick)
         else:
-            record_tick(sim, scratch.safe, chunks[-1], row, beams > 0)
+            record_tick(sim, swarm.safe, chunks[-1], row, beams > 0)
             exchange(sim, tick)
             pool.each(partial(move, sim, tick))
             done = settle(sim, tick)
@@ -213,19 +207,24 @@ def run(setting: Setting, progress: Callable[[float, int], None] | None = None) 
         t_s=np.arange(tick) * setting.dt,
         records=_join(chunks, tick),
         robots=sim.robots,
-        shared=shared,
+        shared=swarm.shared,
         links=sim.links[: sim.links_n[0]].copy(),
         choices=sim.choices[: sim.choices_n[0]].copy(),
         plan_us=np.array(plan_us),
         wall_s=wall_s,
-        memory_bytes=_row_bytes(sim, shared, memory, scratch),
+        memory_bytes=_row_bytes(swarm, memory),
     )
 
 
-def _time_steps(step_all: Callable[..., None], arguments: tuple[Any, ...], robots: int) -> list[float]:
+def _step(setting: Setting, swarm: Swarm, memory: np.ndarray, first: int, last: int) -> None:
+    """Run one tick of robots ``first`` to ``last - 1``."""
+    setting.planner.step_all(first, last, swarm, memory, setting.params)
+
+
+def _time_steps(step_all: Callable[[int, int], None], robots: int) -> list[float]:
     """Run one tick of all robots, timing the whole batch; return the mean time of one robot's step [us]."""
     before = time.perf_counter_ns()
-    step_all(0, robots, *arguments)
+    step_all(0, robots)
     return [(time.perf_counter_ns() - before) / 1e3 / robots]
 
 
@@ -259,7 +258,6 @@ def _join(chunks: list[Records], ticks: int) -> Records:
     return Records(*(np.concatenate(parts)[:ticks] for parts in zip(*chunks, strict=True)))
 
 
-def _row_bytes(sim: Sim, shared: np.ndarray, memory: np.ndarray, scratch: Any) -> int:
+def _row_bytes(swarm: Swarm, memory: np.ndarray) -> int:
     """Return the bytes of one robot's rows."""
-    arrays = (sim.percepts, sim.decisions, sim.ranges, shared, memory, *scratch)
-    return int(sum(a[:1].nbytes for a in arrays))
+    return int(sum(a[:1].nbytes for a in (*arrays_of(swarm), memory)))

@@ -7,7 +7,7 @@ import math
 from swarmscope._jit import jit, jit_inner
 from swarmscope.geometry import point_segment_distance, wrap_angle
 from swarmscope.onboard.control.unicycle import ramp
-from swarmscope.onboard.planning._contract import ARRIVED
+from swarmscope.onboard.reasons import ARRIVED
 from swarmscope.sim.cells import column_of, row_of
 from swarmscope.sim.contact import static_clearance
 from swarmscope.sim.state import Sim

@@ -6,8 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmscope.onboard.percept import DECISION, PEERS, PERCEPT, Rig, Scratch, new_scratch, new_shared
+from swarmscope.onboard.percept import PEERS
+from swarmscope.onboard.rig import Rig
 from swarmscope.onboard.sharing.message import MAX_PACKET_BYTES
+from swarmscope.onboard.view import Swarm, new_swarm
 from swarmscope.sim.lidar import Beams
 from swarmscope.sim.world import World
 
@@ -128,6 +130,8 @@ class Sim(NamedTuple):
     percepts: np.ndarray
     decisions: np.ndarray
     ranges: np.ndarray
+    told: np.ndarray
+    """(N,) int8: side of each robot's shortest way, +1 left, -1 right; 0 = nobody looked, or there is none."""
     queue_due: np.ndarray
     queue_length: np.ndarray
     queue_from: np.ndarray
@@ -159,18 +163,22 @@ CHOICES = 16384
 """Choices of a side that are kept; later ones are counted only."""
 
 
+class Start(NamedTuple):
+    """Where robots start and want to go, world frame, within the bounds (x0, y0, x1, y1) of the world [m]."""
+
+    starts: np.ndarray
+    """(N, 3) x, y [m], yaw [rad]."""
+    goals: np.ndarray
+    """(N, 2)."""
+    bounds: tuple[float, float, float, float]
+
+
 def new_sim(
-    world: World,
-    bounds: tuple[float, float, float, float],
-    beams: Beams,
-    rig: Rig,
-    starts: np.ndarray,
-    goals: np.ndarray,
-    noise: Noise,
-    radio: Radio,
-    clock: Clock,
-) -> tuple[Sim, np.ndarray, Scratch]:
-    """Return the simulation at its start, the robots' shared memories and their working arrays."""
+    world: World, beams: Beams, rig: Rig, start: Start, air: tuple[Noise, Radio], clock: Clock
+) -> tuple[Sim, Swarm]:
+    """Return the simulation at its start, and the rows of its robots. ``air``: errors of the sensors, and the radio."""
+    starts, goals, bounds = start
+    noise, radio = air
     n = len(starts)
     robots = np.zeros(n, ROBOT)
     for k, name in enumerate(("x", "y", "yaw")):
@@ -180,21 +188,18 @@ def new_sim(
     robots["arrival_s"] = np.nan
     robots["min_clearance"] = np.inf
     robots["clearance"] = np.inf
-    percepts = np.zeros(n, PERCEPT)
-    percepts["id"] = np.arange(n)
-    percepts["dt_s"] = clock.dt
-    decisions = np.zeros(n, DECISION)
-    decisions["p_self"] = np.nan
-    decisions["p_left"] = np.nan
+    swarm = new_swarm(n, rig)
+    swarm.percepts["dt_s"] = clock.dt
     columns = max(1, int(np.ceil((bounds[2] - bounds[0]) / CELL_M)))
     rows = max(1, int(np.ceil((bounds[3] - bounds[1]) / CELL_M)))
     sim = Sim(
         world=world,
         beams=beams,
         robots=robots,
-        percepts=percepts,
-        decisions=decisions,
-        ranges=np.full((n, rig.sensor.beams), np.inf, np.float32),
+        percepts=swarm.percepts,
+        decisions=swarm.decisions,
+        ranges=swarm.scans,
+        told=np.zeros(n, np.int8),
         queue_due=np.zeros((n, QUEUE)),
         queue_length=np.zeros((n, QUEUE), np.int64),
         queue_from=np.zeros((n, QUEUE), np.int64),
@@ -217,7 +222,7 @@ def new_sim(
         radio=radio,
         clock=clock,
     )
-    return sim, new_shared(n), new_scratch(n, rig)
+    return sim, swarm
 
 
 def new_records(ticks: int, robots: int, beams: int) -> Records:

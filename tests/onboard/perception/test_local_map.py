@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmscope.onboard.perception.local_map import (
+from swarmscope.onboard.network.local_map import (
     CELL_ANGLE,
     CELL_DISTANCE,
     CELLS,

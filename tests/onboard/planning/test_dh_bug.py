@@ -9,7 +9,7 @@ import pytest
 
 from helpers import DT, Rows, circle, circles_world, place_scenario, rig_of, run_scenario, scan_at, wall
 from swarmscope.onboard.planning import dh_bug
-from swarmscope.onboard.planning._contract import DECIDE, YIELD
+from swarmscope.onboard.reasons import DECIDE, YIELD
 from swarmscope.onboard.planning.dh_bug import (
     AT_GOAL,
     KEY_POINT,

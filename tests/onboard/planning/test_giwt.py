@@ -11,11 +11,11 @@ import pytest
 from giwt_models import make_model
 from helpers import DT, Rows, circle, circles_world, place_scenario, rig_of, run_scenario, scan_at
 from swarmscope.onboard.percept import MAX_OUTBOX
-from swarmscope.onboard.perception.local_map import CELL_ANGLE, CELL_DISTANCE, draw_map, encode_scan, hide_robot
+from swarmscope.onboard.network.local_map import CELL_ANGLE, CELL_DISTANCE, draw_map, encode_scan, hide_robot
 from swarmscope.onboard.planning import giwt, giwt_cnn
-from swarmscope.onboard.planning._contract import R_ALONE, R_ANSWERS, R_FUSED
+from swarmscope.onboard.reasons import R_ALONE, R_ANSWERS, R_FUSED
 from swarmscope.onboard.planning._giwt import Params
-from swarmscope.onboard.planning._giwt_graph import (
+from swarmscope.onboard.network.graph import (
     OWN_CELL,
     VIEW_M,
     information_gain_series,

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmscope.onboard.planning._giwt_graph import (
+from swarmscope.onboard.network.graph import (
     FEATURES,
     GRID_M,
     OWN_CELL,

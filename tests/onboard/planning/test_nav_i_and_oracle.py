@@ -7,7 +7,7 @@ import pytest
 
 from helpers import Rows, circle, circles_world, place_scenario, rig_of, run_scenario, scan_at
 from swarmscope.onboard.planning import nav_i, nav_scope, oracle
-from swarmscope.onboard.planning._contract import ADVANCE, DECIDE, FOLLOW
+from swarmscope.onboard.reasons import ADVANCE, DECIDE, FOLLOW
 
 TREES = [circle(-1.0, 0.3, 0.35), circle(0.6, -0.8, 0.4), circle(1.2, 0.5, 0.3), circle(-0.4, -1.6, 0.3)]
 STARTS = [(-3.0, -1.5, 0.0), (-3.0, 0.0, 0.0), (-3.0, 1.5, 0.0)]

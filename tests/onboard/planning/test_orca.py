@@ -13,7 +13,7 @@ from helpers import DT, Rows, circle, circles_world, place_scenario, rig_of, run
 from swarmscope.errors import MissingExtraError
 from swarmscope.geometry import point_segment_distance
 from swarmscope.onboard.planning import orca
-from swarmscope.onboard.planning._contract import planner_names
+from swarmscope.onboard.planners import planner_names
 from swarmscope.scenarios.read import parse_scenario
 from swarmscope.scenarios.to_kernels import make_setting, make_setup
 from swarmscope.sim.loop import run

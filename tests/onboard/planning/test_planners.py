@@ -15,13 +15,8 @@ from hypothesis import strategies as st
 from giwt_models import make_model
 from helpers import DT, Rows, circles_world, mirrored, place_scenario, rig_of, run_scenario, scan_at
 from swarmscope.onboard.percept import MAX_OUTBOX, PERCEPT
-from swarmscope.onboard.planning._contract import (
-    ARRIVED,
-    REASON_NAMES,
-    STATE_NAMES,
-    load_planner,
-    planner_names,
-)
+from swarmscope.onboard.planners import load_planner, planner_names
+from swarmscope.onboard.reasons import ARRIVED, REASON_NAMES, STATE_NAMES
 from swarmscope.onboard.sharing.message import OK, decode
 
 PLANNERS = planner_names()

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from helpers import Rows, circle, circles_world, place_scenario, rig_of, run_scenario, scan_at, wall
 from swarmscope.onboard.perception.areas import normalise, passable_distance
 from swarmscope.onboard.planning import nav_scope, sfm_i, sfm_mas
-from swarmscope.onboard.planning._contract import ADVANCE, DECIDE, FOLLOW, YIELD
-from swarmscope.onboard.planning.fields import (
+from swarmscope.onboard.reasons import ADVANCE, DECIDE, FOLLOW, YIELD
+from swarmscope.onboard.deciding.fields import (
     following_probability,
     fuse,
     interaction_force,
@@ -23,7 +23,7 @@ from swarmscope.onboard.planning.fields import (
     propulsion,
     yields_to,
 )
-from swarmscope.onboard.planning.fusion import own_probability
+from swarmscope.onboard.deciding.choosing import own_probability
 from swarmscope.onboard.planning.sfm_mas import goes_first, obstacle_stops
 
 L_TH = 0.6

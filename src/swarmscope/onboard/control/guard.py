@@ -10,44 +10,52 @@ has the argument). If nothing passes, the robot brakes straight on, which the pr
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.geometry import point_segment_distance
-from swarmscope.onboard.control.unicycle import ramp, steer
-from swarmscope.onboard.percept import PEERS, Rig, Row
+from swarmscope.onboard.control.unicycle import ramp
+from swarmscope.onboard.percept import PEERS, Row
+from swarmscope.onboard.rig import Rig
 from swarmscope.onboard.sharing.tracks import neighbour_reach
+from swarmscope.onboard.view import View
 
 STEPS = 4
 """Straight pieces that stand for the arc driven until the next tick."""
 FRACTIONS = (1.0, 0.8, 0.6, 0.4, 0.2, 0.1, 0.0)
-PIECES = STEPS + 1
+
+
+class Motion(NamedTuple):
+    """Where a command leads, body frame: at the next tick, and stopped after it by braking straight on [m]."""
+
+    moved_x: float
+    moved_y: float
+    stopped_x: float
+    stopped_y: float
 
 
 @jit
-def guard(
-    ranges: np.ndarray, percept: Row, shared: Row, decision: Row, near: np.ndarray, rig: Rig
-) -> bool:
-    """Lower ``decision``'s speed until it is safe; return whether it had to. ``near (M + 1,) int16`` is scratch.
+def guard(see: View) -> bool:
+    """Lower the speed that was decided until it is safe; return whether it had to.
 
-    ``ranges (M,)`` is the raw scan [m]: invalid beams (NaN, below range_min) forbid motion towards them.
+    The raw scan counts: invalid beams (NaN, below range_min) forbid motion towards them. ``see.edges`` is scratch.
     """
-    body = rig.body
-    v0 = percept["speed"]
-    wanted, w = decision["v"], decision["w"]
+    body = see.rig.body
+    wanted, w = see.out["v"], see.out["w"]
     if not (math.isfinite(wanted) and math.isfinite(w)):
         wanted, w = 0.0, 0.0
     w = min(body.w_max_radps, max(-body.w_max_radps, w))
     wanted = min(body.v_max_mps, max(0.0, wanted))
-    count, nearest = _near_beams(ranges, percept["dt_s"], rig, near)
-    need = min(body.radius_m + rig.clearance, nearest - 1e-6)  # already too close: never closer
+    count, nearest = _near_beams(see.scan, see.percept["dt_s"], see.rig, see.edges)
+    need = min(body.radius_m + see.rig.guarding.clearance_m, nearest - 1e-6)  # already too close: never closer
     for fraction in FRACTIONS:
         v = wanted * fraction
-        if _passes(ranges, percept, shared, v0, v, w, near, count, need, rig):
-            decision["v"], decision["w"] = v, w
+        if _passes(see, v, w, count, need):
+            see.out["v"], see.out["w"] = v, w
             return fraction < 1.0
-    decision["v"], decision["w"] = 0.0, 0.0 if v0 > 1e-6 else w
+    see.out["v"], see.out["w"] = 0.0, 0.0 if see.percept["speed"] > 1e-6 else w
     return True
 
 
@@ -58,8 +66,9 @@ def _near_beams(ranges: np.ndarray, dt: float, rig: Rig, near: np.ndarray) -> tu
     Return how many, and the smallest valid range among them [m].
     """
     body = rig.body
-    reach = body.v_max_mps * (dt + rig.latency) + 2.0 * body.v_max_mps * body.v_max_mps / body.a_max_mps2
-    limit = body.radius_m + 2.0 * rig.clearance + reach
+    brakes = 2.0 * body.v_max_mps * body.v_max_mps / body.a_max_mps2
+    reach = body.v_max_mps * (dt + rig.guarding.latency_s) + brakes
+    limit = body.radius_m + 2.0 * rig.guarding.clearance_m + reach
     least = least_range(rig)
     count = 0
     nearest = math.inf
@@ -79,25 +88,15 @@ def least_range(rig: Rig) -> float:
 
 
 @jit_inner
-def _passes(
-    ranges: np.ndarray,
-    percept: Row,
-    shared: Row,
-    v0: float,
-    v: float,
-    w: float,
-    near: np.ndarray,
-    count: int,
-    need: float,
-    rig: Rig,
-) -> bool:
-    """Tell whether commanding (v, w) from speed ``v0`` keeps clear of every near beam and every neighbour."""
+def _passes(see: View, v: float, w: float, count: int, need: float) -> bool:
+    """Tell whether commanding (v, w) keeps ``need`` [m] clear of every near beam, and of every neighbour's half."""
+    rig, percept = see.rig, see.percept
     body = rig.body
-    dt = percept["dt_s"]
-    x0, y0 = v0 * rig.latency, 0.0
+    v0 = percept["speed"]
     yaw = 0.0
-    step = dt / STEPS
+    step = percept["dt_s"] / STEPS
     speed = v0
+    x0, y0 = v0 * rig.guarding.latency_s, 0.0
     x1, y1, x2, y2, x3, y3, x4, y4 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     x, y = x0, y0
     for k in range(STEPS):
@@ -117,16 +116,17 @@ def _passes(
     x5, y5 = x + brake * math.cos(yaw), y + brake * math.sin(yaw)
     if x5 * x5 + y5 * y5 + brake < 1e-10 and v0 < 1e-6:
         return True
-    if not _clear_of_tracks(percept, shared, x4, y4, x5, y5, brake, rig):
+    motion = Motion(x4, y4, x5, y5)
+    if not _clear_of_tracks(percept, see.shared, motion, rig):
         return False
     for k in range(count):
-        n = near[k]
-        s = ranges[n]
+        n = see.edges[k]
+        s = see.scan[n]
         if not s >= least_range(rig):  # forbid that way
-            s = body.radius_m + rig.clearance
+            s = body.radius_m + rig.guarding.clearance_m
         px, py = s * rig.cos[n], s * rig.sin[n]
-        gap = _point_gap(percept, shared, px, py, rig)
-        if gap and not _in_own_half(px, py, s, x4, y4, x5, y5, brake, rig):
+        gap = _point_gap(percept, see.shared, px, py, rig)
+        if gap and not _in_own_half(px, py, s, motion, rig):
             return False
         if (
             point_segment_distance(px, py, 0.0, 0.0, x1, y1) < need
@@ -155,28 +155,25 @@ def _point_gap(percept: Row, shared: Row, px: float, py: float, rig: Rig) -> boo
 
 
 @jit_inner
-def _in_own_half(
-    px: float, py: float, s: float, x4: float, y4: float, x5: float, y5: float, brake: float, rig: Rig
-) -> bool:
-    """Tell whether a motion that is at (x4, y4) at the next tick and could stop at (x5, y5) keeps to its half.
+def _in_own_half(px: float, py: float, s: float, motion: Motion, rig: Rig) -> bool:
+    """Tell whether a motion keeps to its half of the way to (px, py); its braking counts twice.
 
-    (px, py) is the nearest known point of a neighbour's body at range ``s``; braking counts twice.
+    (px, py) is the nearest known point of a neighbour's body at range ``s``.
     """
     if s <= 1e-6:
-        return x5 * x5 + y5 * y5 < 1e-9
+        return motion.stopped_x * motion.stopped_x + motion.stopped_y * motion.stopped_y < 1e-9
     nx, ny = px / s, py / s
-    moved = x4 * nx + y4 * ny
-    stopped = x5 * nx + y5 * ny
+    moved = motion.moved_x * nx + motion.moved_y * ny
+    stopped = motion.stopped_x * nx + motion.stopped_y * ny
     towards = max(moved, stopped)
     if towards <= 1e-6:
         return True
-    return towards + max(0.0, stopped - moved) <= 0.5 * (s - rig.body.radius_m - rig.clearance)
+    free = s - rig.body.radius_m - rig.guarding.clearance_m
+    return towards + max(0.0, stopped - moved) <= 0.5 * free
 
 
 @jit_inner
-def _clear_of_tracks(
-    percept: Row, shared: Row, x4: float, y4: float, x5: float, y5: float, brake: float, rig: Rig
-) -> bool:
+def _clear_of_tracks(percept: Row, shared: Row, motion: Motion, rig: Rig) -> bool:
     """Apply the half-gap rule to every tracked neighbour, seen now or remembered."""
     c, s = math.cos(percept["compass"]), math.sin(percept["compass"])
     for t in range(PEERS):
@@ -190,19 +187,6 @@ def _clear_of_tracks(
         if surface > 4.0 * rig.body.radius_m + 1.0 or d < 1e-6:
             continue
         scale = surface / d
-        if not _in_own_half(x * scale, y * scale, max(surface, 1e-6), x4, y4, x5, y5, brake, rig):
+        if not _in_own_half(x * scale, y * scale, max(surface, 1e-6), motion, rig):
             return False
     return True
-
-
-@jit
-def halt(decision: Row) -> None:
-    """Ask for standing still, headed as we are."""
-    decision["heading"], decision["v"], decision["w"] = 0.0, 0.0, 0.0
-
-
-@jit
-def head_for(decision: Row, percept: Row, heading: float, speed: float, rig: Rig) -> None:
-    """Ask for driving towards ``heading`` (body frame) at ``speed`` once turned."""
-    decision["heading"] = heading
-    decision["v"], decision["w"] = steer(heading, speed, rig.body.w_max_radps, percept["dt_s"])

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from swarmscope._jit import jit, jit_inline
+from swarmscope.onboard.rig import Rig
 
 
 @jit
@@ -33,34 +34,24 @@ def safe_distance(theta: float, r_safe: float, half_sector: float) -> float:
 
 
 @jit
-def safe_speed(
-    ranges: np.ndarray,
-    range_min: float,
-    cos: np.ndarray,
-    sin: np.ndarray,
-    heading: float,
-    r_protect: float,
-    v_max: float,
-    a_max: float,
-    dt: float,
-    view: float = 0.5 * math.pi,
-) -> float:
+def safe_speed(ranges: np.ndarray, rig: Rig, heading: float, dt: float, view: float = 0.5 * math.pi) -> float:
     """Return the largest speed [m/s] towards ``heading`` [rad, body frame] by (2).
 
-    min over |theta| < pi / 2 of sqrt(2 a_max (d(theta) - l(theta))) / cos(theta), at most ``v_max``; 0 as soon as
-    a return is inside the safe zone. ``ranges (M,)`` [m], ``cos``, ``sin (M,)`` of the beams. An invalid beam
-    counts as range 0. ``view`` [rad]: only returns up to so far from ``heading`` count; pi / 2 as printed.
+    min over |theta| < pi / 2 of sqrt(2 a_max (d(theta) - l(theta))) / cos(theta), at most v_max; 0 as soon as a return
+    is inside the safe zone of the footprint. ``ranges (M,)`` [m]. An invalid beam counts as range 0. ``view`` [rad]:
+    only returns up to so far from ``heading`` count; pi / 2 as printed.
     """
-    r_safe, half = safe_sector(r_protect, v_max, dt)
+    v_max, a_max = rig.body.v_max_mps, rig.body.a_max_mps2
+    r_safe, half = safe_sector(rig.footprint, v_max, dt)
     far = r_safe + v_max * v_max / (2.0 * a_max)  # from here on a beam straight ahead allows v_max
     c, s = math.cos(heading), math.sin(heading)
     least = max(1e-9, math.cos(view))
     speed = v_max
     for n in range(ranges.size):
-        ahead = cos[n] * c + sin[n] * s
+        ahead = rig.cos[n] * c + rig.sin[n] * s
         if ahead <= least or ranges[n] >= far:
             continue
-        if not ranges[n] >= range_min:
+        if not ranges[n] >= rig.sensor.range_min:
             return 0.0
         theta = math.acos(min(1.0, ahead))
         slack = ranges[n] - safe_distance(theta, r_safe, half)

@@ -8,6 +8,7 @@ import numpy as np
 
 from swarmscope._jit import jit, jit_inner
 from swarmscope.geometry import TWO_PI, positive_angle
+from swarmscope.onboard.sensor import Sensor
 
 FLAT = 1e-5
 """Change from beam to beam, as a fraction of the range, below which the filtered scan counts as flat."""
@@ -15,14 +16,7 @@ FLAT = 1e-5
 
 @jit
 def extrema(
-    filtered: np.ndarray,
-    safe: np.ndarray,
-    angle_min: float,
-    increment: float,
-    wraps: bool,
-    range_max: float,
-    angles: np.ndarray,
-    distances: np.ndarray,
+    filtered: np.ndarray, safe: np.ndarray, sensor: Sensor, angles: np.ndarray, distances: np.ndarray
 ) -> int:
     """Write the masked extrema of ``filtered (M,)`` (7) into ``angles`` [rad], ``distances`` [m]; return how many.
 
@@ -30,10 +24,10 @@ def extrema(
     directions that are not safe are left out (gaps too narrow for the robot). Ascending angles, sensor frame.
     """
     beams = filtered.size
-    flat = np.float32(FLAT * range_max)
+    flat = np.float32(FLAT * sensor.range_max)
     start = 0
-    steps = beams if wraps else beams - 1
-    if wraps:  # begin just after a slope, so that no plateau is cut in two
+    steps = beams if sensor.wraps else beams - 1
+    if sensor.wraps:  # begin just after a slope, so that no plateau is cut in two
         while start < beams and abs(filtered[(start + 1) % beams] - filtered[start]) <= flat:
             start += 1
         if start == beams:
@@ -43,7 +37,7 @@ def extrema(
     slope_step = 0
     count = 0
     n = start
-    for k in range(steps + (1 if wraps else 0)):
+    for k in range(steps + (1 if sensor.wraps else 0)):
         after = n + 1 if n + 1 < beams else 0
         change = filtered[after] - filtered[n]
         if change > flat or change < -flat:
@@ -53,7 +47,7 @@ def extrema(
                 if beam >= beams:
                     beam -= beams
                 if safe[beam] and count < angles.size:
-                    angles[count] = angle_min + beam * increment
+                    angles[count] = sensor.angle_min + beam * sensor.increment
                     distances[count] = filtered[beam]
                     count += 1
             rising, slope_at, slope_step = sign, n, k

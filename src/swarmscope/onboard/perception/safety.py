@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from swarmscope._jit import jit, jit_inner
+from swarmscope.onboard.sensor import Sensor
 
 BINS = 512
 """Entries of a reach table over [0, range_max): 1 cm each at 5 m."""
@@ -16,9 +18,18 @@ UNSEEN_HALF_ANGLE = math.pi / 6.0
 """What lies just outside a limited field of view counts as a return two footprints away: asin(1/2) to either side."""
 
 
-def blocking_half_angle(
-    s: float, footprint: float, l_th: float, half_alpha: float, look_ahead: float, margin: float
-) -> float:
+class Rule(NamedTuple):
+    """What makes a direction unsafe; lengths in m, angles in rad, 0 = does not."""
+
+    l_th: float
+    """Returns nearer than this keep the footprint, and ``half_alpha`` to either side, off."""
+    half_alpha: float = 0.0
+    look_ahead: float = 0.0
+    """Returns nearer than this are passed at ``margin``."""
+    margin: float = 0.0
+
+
+def blocking_half_angle(s: float, footprint: float, rule: Rule) -> float:
     """Return how far [rad] to either side a return at range ``s`` [m] makes directions unsafe (0 = not at all).
 
     The largest of three rules. Nav-SCOPE (3): alpha/2 when ``s < l_th``. Swept footprint (readings 3): a disc
@@ -27,22 +38,14 @@ def blocking_half_angle(
     ``margin`` from the return, asin(margin / s), when ``s < look_ahead``.
     """
     half = 0.0
-    if s < l_th:
-        half = max(half_alpha, math.asin(min(1.0, footprint / s)) if s > footprint else 0.5 * math.pi)
-    if s < look_ahead:
-        half = max(half, math.asin(margin / s) if s > margin else 0.5 * math.pi)
+    if s < rule.l_th:
+        half = max(rule.half_alpha, math.asin(min(1.0, footprint / s)) if s > footprint else 0.5 * math.pi)
+    if s < rule.look_ahead:
+        half = max(half, math.asin(rule.margin / s) if s > rule.margin else 0.5 * math.pi)
     return half
 
 
-def reach_table(
-    increment: float,
-    range_max: float,
-    footprint: float,
-    l_th: float,
-    half_alpha: float,
-    look_ahead: float,
-    margin: float,
-) -> np.ndarray:
+def reach_table(increment: float, range_max: float, footprint: float, rule: Rule) -> np.ndarray:
     """Return, for each range bin, how many beams to either side a return blocks; -1 = none. (BINS + 2,) int16.
 
     Rounded to the safe side: a bin blocks what the nearest range in it blocks. Entry ``BINS`` is the number of
@@ -51,9 +54,9 @@ def reach_table(
     """
     table = np.empty(BINS + 2, np.int16)
     table[BINS] = 0
-    table[BORDER] = math.ceil(max(half_alpha, UNSEEN_HALF_ANGLE) / increment - 1e-6)
+    table[BORDER] = math.ceil(max(rule.half_alpha, UNSEEN_HALF_ANGLE) / increment - 1e-6)
     for k in range(BINS):
-        half = blocking_half_angle(k * range_max / BINS, footprint, l_th, half_alpha, look_ahead, margin)
+        half = blocking_half_angle(k * range_max / BINS, footprint, rule)
         table[k] = math.ceil(half / increment - 1e-6) if half > 0.0 else -1
         if half > 0.0:
             table[BINS] = k + 1
@@ -62,13 +65,7 @@ def reach_table(
 
 @jit
 def safe_directions(
-    ranges: np.ndarray,
-    range_min: float,
-    range_max: float,
-    wraps: bool,
-    reach: np.ndarray,
-    edges: np.ndarray,
-    safe: np.ndarray,
+    ranges: np.ndarray, sensor: Sensor, reach: np.ndarray, edges: np.ndarray, safe: np.ndarray
 ) -> int:
     """Write 1 into ``safe (M,)`` for each beam direction that is safe, else 0; return how many are.
 
@@ -79,18 +76,18 @@ def safe_directions(
     beams = ranges.size
     for n in range(beams + 1):
         edges[n] = 0
-    if not wraps:
-        _block(edges, beams, wraps, -1, reach[BORDER] - 1)
-        _block(edges, beams, wraps, beams - reach[BORDER], beams)
-    scale = np.float32(BINS / range_max)
-    far = np.float32(reach[BINS] * range_max / BINS)
+    if not sensor.wraps:
+        _block(edges, beams, sensor.wraps, -1, reach[BORDER] - 1)
+        _block(edges, beams, sensor.wraps, beams - reach[BORDER], beams)
+    scale = np.float32(BINS / sensor.range_max)
+    far = np.float32(reach[BINS] * sensor.range_max / BINS)
     for n in range(beams):
         s = ranges[n]
         if s >= far:
             continue
-        k = reach[min(BINS - 1, int(s * scale))] if s >= range_min else reach[0]
+        k = reach[min(BINS - 1, int(s * scale))] if s >= sensor.range_min else reach[0]
         if k >= 0:
-            _block(edges, beams, wraps, n - k, n + k)
+            _block(edges, beams, sensor.wraps, n - k, n + k)
     depth = 0
     count = 0
     for n in range(beams):
@@ -121,39 +118,9 @@ def _block(edges: np.ndarray, beams: int, wraps: bool, first: int, last: int) ->
 
 
 @jit
-def beam_of(bearing: float, angle_min: float, increment: float, beams: int, wraps: bool) -> int:
+def beam_of(bearing: float, sensor: Sensor) -> int:
     """Return the beam nearest to ``bearing`` (body frame, rad), or -1 outside the field of view."""
-    n = int(math.floor((bearing - angle_min) / increment + 0.5))
-    if wraps:
-        return n % beams
-    return n if 0 <= n < beams else -1
-
-
-@jit
-def corridor_length(
-    ranges: np.ndarray,
-    range_min: float,
-    cos: np.ndarray,
-    sin: np.ndarray,
-    bearing: float,
-    half_width: float,
-    limit: float,
-) -> float:
-    """Return how far [m] a disc of radius ``half_width`` gets along ``bearing`` before it touches a return.
-
-    ``cos``, ``sin (M,)`` are the beams' directions. At most ``limit``; an invalid beam within 90 degrees of
-    the bearing stops it at once.
-    """
-    free = limit
-    c, s = math.cos(bearing), math.sin(bearing)
-    for n in range(ranges.size):
-        r = ranges[n]
-        ahead = cos[n] * c + sin[n] * s
-        if not ahead > 0.0 or r == np.inf:
-            continue
-        if not r >= range_min:
-            return 0.0
-        across = r * (sin[n] * c - cos[n] * s)
-        if abs(across) < half_width:
-            free = min(free, r * ahead - math.sqrt(half_width * half_width - across * across))
-    return max(0.0, free)
+    n = int(math.floor((bearing - sensor.angle_min) / sensor.increment + 0.5))
+    if sensor.wraps:
+        return n % sensor.beams
+    return n if 0 <= n < sensor.beams else -1

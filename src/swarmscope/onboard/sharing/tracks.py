@@ -7,7 +7,9 @@ import math
 import numpy as np
 
 from swarmscope._jit import jit, jit_inline, jit_inner
-from swarmscope.onboard.percept import PEERS, Rig, Row
+from swarmscope.onboard.percept import PEERS, Row
+from swarmscope.onboard.rig import Rig
+from swarmscope.onboard.view import View
 
 STILL_RADIUS = 0.08
 """A neighbour that stays within this of one place stands still [m]."""
@@ -34,7 +36,7 @@ def update_tracks(percept: Row, shared: Row, rig: Rig, dx: float, dy: float) -> 
     """Move every track on by dead reckoning, then correct it with what is observed now.
 
     An alpha-beta filter in the compass frame, relative to the robot; ``dx, dy`` [m] is its own motion. A
-    neighbour that drops out of view is kept for ``rig.persistence``, slowing down.
+    neighbour that drops out of view is kept for ``rig.guarding.persistence_s``, slowing down.
     """
     now, dt = percept["now_s"], percept["dt_s"]
     noisy = rig.sensor.position_sigma > 0.0
@@ -43,7 +45,7 @@ def update_tracks(percept: Row, shared: Row, rig: Rig, dx: float, dy: float) -> 
     for t in range(PEERS):
         if shared["track_id"][t] < 0:
             continue
-        if now - shared["track_seen_s"][t] > rig.persistence:
+        if now - shared["track_seen_s"][t] > rig.guarding.persistence_s:
             shared["track_id"][t] = -1
             continue
         shared["track_x"][t] += shared["track_vx"][t] * dt - dx
@@ -120,43 +122,53 @@ def _place(shared: Row, x: float, y: float) -> int:
 
 
 @jit
-def mask_moving_neighbours(
-    ranges: np.ndarray, percept: Row, shared: Row, rig: Rig, still_s: float, out: np.ndarray
-) -> None:
-    """Copy the scan into ``out`` without the returns of neighbours that move (no return instead).
+def mask_moving_neighbours(see: View, still_s: float) -> None:
+    """Copy the scan into ``see.masked`` without the returns of neighbours that move (no return instead).
 
     Moving neighbours are kept apart from by the yield rule and the guard; taken for obstacles they would
     make every robot turn off behind every other. One that has stood for ``still_s`` stays in: it is an obstacle.
     """
-    sensor = rig.sensor
-    for n in range(sensor.beams):
-        out[n] = ranges[n]
+    for n in range(see.rig.sensor.beams):
+        see.masked[n] = see.scan[n]
     for t in range(PEERS):
-        if shared["track_id"][t] < 0 or percept["now_s"] - shared["track_moved_s"][t] >= still_s:
+        if moves(see.percept, see.shared, t, still_s):
+            _hide(see, t)
+
+
+@jit_inline
+def moves(percept: Row, shared: Row, t: int, still_s: float) -> bool:
+    """Tell whether track ``t`` is that of a neighbour that has moved within the last ``still_s`` [s]."""
+    return bool(shared["track_id"][t] >= 0 and percept["now_s"] - shared["track_moved_s"][t] < still_s)
+
+
+@jit_inner
+def _hide(see: View, t: int) -> None:
+    """Take the returns that may belong to the neighbour of track ``t`` out of the masked scan."""
+    percept, shared, rig, ranges = see.percept, see.shared, see.rig, see.scan
+    sensor = rig.sensor
+    c, s = math.cos(percept["compass"]), math.sin(percept["compass"])
+    x = c * shared["track_x"][t] + s * shared["track_y"][t]
+    y = c * shared["track_y"][t] - s * shared["track_x"][t]
+    d = math.sqrt(x * x + y * y)
+    reach = neighbour_reach(d, rig)
+    if d - reach > sensor.range_max:
+        return
+    half_angle = math.asin(reach / d) if d > reach else math.pi
+    spread = int(math.ceil(half_angle / sensor.increment))
+    centre = int(math.floor((math.atan2(y, x) - sensor.angle_min) / sensor.increment + 0.5))
+    if 2 * spread + 1 > sensor.beams:
+        spread = (sensor.beams - 1) // 2
+    for k in range(centre - spread, centre + spread + 1):
+        n = k
+        if sensor.wraps and k < 0:
+            n = k + sensor.beams
+        elif sensor.wraps and k >= sensor.beams:
+            n = k - sensor.beams
+        if n < 0 or n >= sensor.beams or not ranges[n] >= sensor.range_min:
             continue
-        c, s = math.cos(percept["compass"]), math.sin(percept["compass"])
-        x = c * shared["track_x"][t] + s * shared["track_y"][t]
-        y = c * shared["track_y"][t] - s * shared["track_x"][t]
-        d = math.sqrt(x * x + y * y)
-        reach = neighbour_reach(d, rig)
-        if d - reach > sensor.range_max:
-            continue
-        half_angle = math.asin(reach / d) if d > reach else math.pi
-        spread = int(math.ceil(half_angle / sensor.increment))
-        centre = int(math.floor((math.atan2(y, x) - sensor.angle_min) / sensor.increment + 0.5))
-        if 2 * spread + 1 > sensor.beams:
-            spread = (sensor.beams - 1) // 2
-        for k in range(centre - spread, centre + spread + 1):
-            n = k
-            if sensor.wraps and k < 0:
-                n = k + sensor.beams
-            elif sensor.wraps and k >= sensor.beams:
-                n = k - sensor.beams
-            if n < 0 or n >= sensor.beams or not ranges[n] >= sensor.range_min:
-                continue
-            ex, ey = ranges[n] * rig.cos[n] - x, ranges[n] * rig.sin[n] - y
-            if ex * ex + ey * ey <= reach * reach:
-                out[n] = np.inf
+        ex, ey = ranges[n] * rig.cos[n] - x, ranges[n] * rig.sin[n] - y
+        if ex * ex + ey * ey <= reach * reach:
+            see.masked[n] = np.inf
 
 
 @jit_inline

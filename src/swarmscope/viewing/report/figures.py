@@ -11,8 +11,8 @@ from swarmscope.errors import SwarmscopeError
 from swarmscope.experiments.experiment import Sweep, merged, sweep_label
 from swarmscope.experiments.results import Run, flow_time_increases
 from swarmscope.onboard.body import Body, protection_model
-from swarmscope.onboard.planning._contract import load_planner
-from swarmscope.onboard.planning.fields import interaction_force
+from swarmscope.onboard.deciding.fields import interaction_force
+from swarmscope.onboard.planners import load_planner
 from swarmscope.scenarios.scenario import RobotModel
 from swarmscope.viewing.pictures import FAINT, INK
 from swarmscope.viewing.report import words
@@ -195,10 +195,9 @@ def _default(material: Material, sweep: Sweep) -> float | None:
 
 def _defaults(material: Material, planner: str) -> dict[str, float]:
     try:
-        module = load_planner(str(material.planner_keys(planner).get("name", "")))
+        return load_planner(str(material.planner_keys(planner).get("name", ""))).defaults
     except SwarmscopeError:
         return {}
-    return dict(module.Params._field_defaults)
 
 
 def flow_time_picture(material: Material) -> Picture | None:

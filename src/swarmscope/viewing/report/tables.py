@@ -9,7 +9,7 @@ from swarmscope.errors import UnknownNameError
 from swarmscope.experiments.results import Run, TimeBudget, time_budget
 from swarmscope.experiments.weight import NEIGHBOUR_PRINTED, SELF_PRINTED, WEIGHT_PRINTED, WeightResult
 from swarmscope.judging.statistics import PairedDifference
-from swarmscope.onboard.planning._contract import load_planner
+from swarmscope.onboard.planners import load_planner
 from swarmscope.viewing.report import words
 from swarmscope.viewing.report.blocks import Line, Mark, Row, Table, Value, cell
 from swarmscope.viewing.report.material import ALL, Material
@@ -302,10 +302,10 @@ def parameter_table(material: Material) -> Table:
 
 def _about(planner: str) -> tuple[str, str]:
     try:
-        module = load_planner(planner)
+        found = load_planner(planner)
     except UnknownNameError:
         return "not installed", words.MISSING
-    return str(module.SUMMARY), str(module.NEEDS)
+    return found.summary, found.needs
 
 
 def total(runs: list[Run], metric: str) -> int:

@@ -10,10 +10,12 @@ Before anything else ranges become codes of one byte, in data sets and on board 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from swarmscope._jit import jit, jit_inline
+from swarmscope.onboard.sensor import Sensor
 
 CELLS = 101
 CHANNELS = 2
@@ -58,50 +60,52 @@ def encode_scan(ranges: np.ndarray, out: np.ndarray) -> None:
 
 
 @jit
-def hide_robot(
-    codes: np.ndarray, angle_min: float, increment: float, wraps: bool, x: float, y: float, radius: float
-) -> None:
+def hide_robot(codes: np.ndarray, sensor: Sensor, x: float, y: float, radius: float) -> None:
     """Make the beams UNKNOWN that end at a robot of ``radius`` [m] at (x, y) [m], body frame."""
     beams = codes.shape[0]
     distance = math.sqrt(x * x + y * y)
     if distance <= radius:
         return
     half = math.asin(radius / distance)
-    centre = (math.atan2(y, x) - angle_min) / increment
-    low = int(math.floor(centre - half / increment))
-    high = int(math.ceil(centre + half / increment))
+    centre = (math.atan2(y, x) - sensor.angle_min) / sensor.increment
+    low = int(math.floor(centre - half / sensor.increment))
+    high = int(math.ceil(centre + half / sensor.increment))
     nearest = (distance - radius) / CODE_STEP_M - 2.0
     farthest = (distance + radius) / CODE_STEP_M + 2.0
     for k in range(low, high + 1):
-        n = k % beams if wraps else k
+        n = k % beams if sensor.wraps else k
         if 0 <= n < beams and nearest <= codes[n] <= farthest and codes[n] <= FARTHEST:
             codes[n] = UNKNOWN
 
 
+class Drawing(NamedTuple):
+    """How a scan is drawn: beam n looks at ``angle_min + n increment`` [rad, body frame]."""
+
+    angle_min: float
+    increment: float
+    target: float
+    """Direction of the picture's x axis [rad, body frame]."""
+    radius_m: float
+    """What the picture shows."""
+    seen_m: float
+    """How far the sensor sees."""
+
+
 @jit
 def draw_map(
-    codes: np.ndarray,
-    angle_min: float,
-    increment: float,
-    target: float,
-    radius_m: float,
-    seen_m: float,
-    cell_angle: np.ndarray,
-    cell_distance: np.ndarray,
-    out: np.ndarray,
+    codes: np.ndarray, drawing: Drawing, cell_angle: np.ndarray, cell_distance: np.ndarray, out: np.ndarray
 ) -> None:
-    """Draw the scan ``codes (M,)`` uint8 into ``out (CHANNELS, CELLS, CELLS)``, x along ``target`` [rad, body frame].
+    """Draw the scan ``codes (M,)`` uint8 into ``out (CHANNELS, CELLS, CELLS)``.
 
-    ``cell_angle``, ``cell_distance`` are those of ``polar_cells``. Beam n looks at ``angle_min + n increment``; cells
-    that no beam comes near (a scan of less than a full circle) stay unknown, and those farther than the sensor sees,
-    ``seen_m``.
+    ``cell_angle``, ``cell_distance`` are those of ``polar_cells``. Cells that no beam comes near (a scan of less than a
+    full circle) stay unknown, and those farther than the sensor sees.
     """
     beams = codes.shape[0]
-    cell_m = 2.0 * radius_m / (CELLS - 1)
-    per_circle = 2.0 * math.pi / increment
-    shift = (target - angle_min) / increment
+    cell_m = 2.0 * drawing.radius_m / (CELLS - 1)
+    per_circle = 2.0 * math.pi / drawing.increment
+    shift = (drawing.target - drawing.angle_min) / drawing.increment
     per_code = CODE_STEP_M / cell_m
-    rim = min(0.5 * (CELLS - 1), seen_m / cell_m)
+    rim = min(0.5 * (CELLS - 1), drawing.seen_m / cell_m)
     for row in range(CELLS):
         for column in range(CELLS):
             out[HIT, row, column] = 0
@@ -109,7 +113,7 @@ def draw_map(
             away = cell_distance[row, column]
             if away > rim:
                 continue
-            beam = shift + cell_angle[row, column] / increment + 0.5
+            beam = shift + cell_angle[row, column] / drawing.increment + 0.5
             n = int(math.floor(beam - per_circle * math.floor(beam / per_circle)))
             if n >= beams:
                 continue

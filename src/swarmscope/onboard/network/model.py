@@ -9,15 +9,16 @@ from __future__ import annotations
 
 import hashlib
 import json
-from functools import lru_cache
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from swarmscope.errors import InputFileError, MissingExtraError
-from swarmscope.onboard.perception.local_map import CELLS, CHANNELS
-from swarmscope.onboard.planning._giwt_graph import FEATURES, VIEW_M
+from swarmscope.onboard.network.graph import FEATURES, VIEW_M
+from swarmscope.onboard.network.local_map import CELLS, CHANNELS
 
 FORMAT = "swarmscope-giwt"
 VERSION = 1
@@ -82,6 +83,38 @@ class Network:
         with np.errstate(over="ignore", invalid="ignore"):
             found: np.ndarray = 1.0 / (1.0 + np.exp(logits[:, 1] - logits[:, 0]))
         return found
+
+
+@dataclass(frozen=True)
+class Model:
+    """Where a planner's network lies, and what kinds of network the planner runs."""
+
+    planner: str
+    folder: Path
+    networks: frozenset[str]
+
+    @cached_property
+    def network(self) -> Network:
+        """The network, loaded when it is first used; raises MissingExtraError without ONNX Runtime."""
+        return load_network(self.folder, self.planner, self.networks)
+
+    def at(self, folder: Path | str) -> Model:
+        """Return the same with the network in ``folder``."""
+        return replace(self, folder=Path(folder))
+
+    def check(self) -> None:
+        """Raise a MissingExtraError without ONNX Runtime, an InputFileError unless the model is whole."""
+        _runtime(self.planner)
+        check_files(self.folder, self.networks)
+
+    def state(self) -> str:
+        """Return a hash of the model: of its card, which holds those of its files."""
+        return str(read_card(self.folder, self.networks)["sha256"])
+
+
+def shipped(planner: str, network: str) -> Model:
+    """Return the model of a planner that comes with the package."""
+    return Model(planner, SHIPPED / planner.replace("-", "_"), frozenset({network}))
 
 
 def check_runtime(planner: str) -> None:

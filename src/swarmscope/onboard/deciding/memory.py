@@ -6,6 +6,7 @@ import numpy as np
 
 from swarmscope._jit import jit
 from swarmscope.onboard.percept import Row
+from swarmscope.onboard.view import View
 
 LOG = 16
 """Choices of a side that are remembered."""
@@ -15,6 +16,7 @@ MEMORY = np.dtype(
         ("mode", np.uint8),
         ("side", np.int8),
         ("strict", np.uint8),  # follows the border until closer to the goal than ever (after a loop)
+        ("told", np.int8),  # side of the shortest way, +1 left, -1 right: oracles only, 0 on a robot
         ("heading", np.float64),  # direction of travel, compass frame [rad]
         ("turning", np.uint8),  # turns on the spot towards it
         ("wind", np.float64),  # how far the following has turned off the target; may exceed 2 pi [rad]
@@ -49,6 +51,6 @@ def new_memory(robots: int) -> np.ndarray:
 
 
 @jit
-def say(decision: Row, memory: Row, state: int, reason: int) -> None:
+def say(see: View, memory: Row, state: int, reason: int) -> None:
     """Note state and reason for people to read."""
-    decision["state"], decision["reason"], decision["side"] = state, reason, memory["side"]
+    see.out["state"], see.out["reason"], see.out["side"] = state, reason, memory["side"]

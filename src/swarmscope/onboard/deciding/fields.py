@@ -6,6 +6,10 @@ import math
 
 from swarmscope._jit import jit, jit_inline
 
+P_FREE = 0.5
+"""P_s while no obstacle is observed (SFM-MAS 7); taken in every balance of forces, where it cancels or favours no
+side."""
+
 
 @jit_inline
 def sigmoid(x: float) -> float:

@@ -1,0 +1,204 @@
+"""What a planner is, and how one is found by its name.
+
+A planner file defines ``NAME``, ``SUMMARY`` and ``NEEDS`` (what it is given); ``Params``, a NamedTuple of numbers with
+defaults; ``MEMORY``, the dtype of what one robot remembers; and ``decide(see, memory, params)``, compiled or not, which
+runs once a tick for each robot between perception and guard (``tick.py``). It may define
+
+``new_memory(robots)``  fresh memory that is not all zeros
+``REASONS``             words of its own for why a robot does what it does; their codes begin at ``reasons.FIRST_OWN``
+``VARIANTS``            planners that differ from it by fixed parameters: a mapping of names to ``Variant``
+``decide_all(first, last, swarm, memories, params)``  instead of ``decide``: all robots at once, for libraries
+``check_available()``   raises an error where a library or a model is missing
+``MODELS``              of planners that run a network: the ``network.model.Model`` of each, which ``decide_all`` is
+                        given after ``params``
+"""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cache, cached_property
+from pathlib import Path
+from types import ModuleType
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from swarmscope.bounds import bounds_of, checked, words
+from swarmscope.errors import ConfigError, UnknownNameError
+from swarmscope.onboard.loops import Step, batch_step, compiled_step, is_compiled, plain_step
+from swarmscope.onboard.reasons import REASON_NAMES
+from swarmscope.onboard.tick import guard_all, perceive_all
+from swarmscope.onboard.view import Swarm
+
+STILL_S = 0.6
+"""A neighbour that has not moved for so long [s] is an obstacle, for planners without a parameter ``still_s``."""
+NOTHING = np.dtype([("nothing", np.uint8)])
+"""Memory of planners that remember nothing."""
+
+
+class Variant(NamedTuple):
+    """A planner that differs from its file's first one by numbers."""
+
+    summary: str
+    needs: str
+    fixed: Mapping[str, float] = {}
+    """Parameters that nobody can set."""
+    told: bool = False
+    """It is told the side of the shortest way, in ``memory["told"]``: an oracle, not for robots."""
+
+
+class NoParams(NamedTuple):
+    """Parameters of planners that have none of their own."""
+
+    still_s: float = STILL_S
+    """A neighbour that has not moved for so long is an obstacle."""
+
+
+@dataclass(frozen=True)
+class Planner:
+    """A planner, whatever its file leaves out filled in."""
+
+    name: str
+    summary: str
+    needs: str
+    module: ModuleType = field(repr=False)
+    fixed: Mapping[str, float] = field(default_factory=dict)
+    told: bool = False
+    model: Any = None
+    """Its network (``network.model.Model``), None without."""
+
+    @property
+    def params_type(self) -> Any:
+        """Its ``Params``."""
+        return getattr(self.module, "Params", NoParams)
+
+    @property
+    def defaults(self) -> dict[str, Any]:
+        """What can be set, with defaults."""
+        return {k: v for k, v in self.params_type._field_defaults.items() if k not in self.fixed}
+
+    def params(self, values: Mapping[str, Any] | None = None) -> Any:
+        """Return its parameters with ``values`` set, each converted to the declared type and within its bounds."""
+        values = values or {}
+        for key in values:
+            if key in self.fixed:
+                raise ConfigError(f"planner '{self.name}': {key}", f"is fixed at {self.fixed[key]:g}")
+            if key not in self.defaults:
+                raise UnknownNameError("parameter", key, self.defaults, f"planner '{self.name}'")
+        kind, where = self.params_type, f"planner '{self.name}': "
+        bounds, merged = bounds_of(kind), self.defaults | dict(self.fixed) | dict(values)
+        defaults = kind._field_defaults.items()
+        return kind(**{k: checked(merged[k], default, bounds.get(k), where + k) for k, default in defaults})
+
+    def bounds(self, name: str) -> str:
+        """Return the bounds of a parameter, for people to read."""
+        return words(bounds_of(self.params_type).get(name))
+
+    def settings(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """Return everything that can be set, with ``values`` set."""
+        params = self.params(values)._asdict()
+        return {key: params[key] for key in self.defaults}
+
+    @property
+    def is_told(self) -> bool:
+        """Whether its memory has a place for the side of the shortest way, and it may look there."""
+        return self.told or "told" in self.params_type._fields
+
+    def new_memory(self, robots: int) -> np.ndarray:
+        """Return the memory of ``robots`` robots that have seen nothing yet."""
+        make = getattr(self.module, "new_memory", None)
+        memory: np.ndarray = np.zeros(robots, getattr(self.module, "MEMORY", NOTHING)) if make is None else make(robots)
+        return memory
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """The words for its reasons, by their codes."""
+        return (*REASON_NAMES, *getattr(self.module, "REASONS", ()))
+
+    @cached_property
+    def _step(self) -> Step:
+        decide_all = getattr(self.module, "decide_all", None)
+        if decide_all is not None:
+            return batch_step(decide_all, *([] if self.model is None else [self.model]))
+        if is_compiled(self.module.decide):
+            return compiled_step(self.module.decide, self.module)
+        return plain_step(self.module.decide)
+
+    def step_all(self, first: int, last: int, swarm: Swarm, memories: np.ndarray, params: Any) -> None:
+        """Run one tick of robots ``first`` to ``last - 1``, from scan to command; for none it loads the kernels."""
+        self._step(first, last, swarm, memories, params, float(getattr(params, "still_s", STILL_S)))
+
+    @property
+    def kernels(self) -> tuple[Any, ...]:
+        """The kernels that are compiled when it first runs."""
+        if is_compiled(self._step):
+            return (self._step,)
+        own = (getattr(self.module, name, None) for name in ("prepare_all", "command_all"))
+        return (perceive_all, guard_all, *(kernel for kernel in own if kernel is not None))
+
+    def check_available(self) -> None:
+        """Raise an error when its library or its network is not here."""
+        check = getattr(self.module, "check_available", None) if self.model is None else self.model.check
+        if check is not None:
+            check()
+
+    def with_model(self, folder: Path | str) -> Planner:
+        """Return the same planner with the network in ``folder``; raises ConfigError for one that runs none."""
+        if self.model is None:
+            raise ConfigError(f"planner '{self.name}'", "runs no network")
+        return replace(self, model=self.model.at(folder))
+
+
+@cache
+def planners_in(module: ModuleType) -> tuple[Planner, ...]:
+    """Return the planners of a file: the one that it is named for, and its variants."""
+    _name_params(module)
+    models = getattr(module, "MODELS", {})
+    variants = getattr(module, "VARIANTS", {})
+    first = Variant(module.SUMMARY, module.NEEDS)
+    return tuple(
+        Planner(name, variant.summary, variant.needs, module, variant.fixed, variant.told, models.get(name))
+        for name, variant in {module.NAME: first, **variants}.items()
+    )
+
+
+def _name_params(module: ModuleType) -> None:
+    """Name a file's ``Params`` after it.
+
+    Numba tells named tuples apart by class name and types of the fields only: two planners' ``Params`` with equally
+    many floats would be one type, and every call of the one loaded later would take a detour of 0.7 ms.
+    """
+    kind = getattr(module, "Params", None)
+    if kind is not None and kind.__name__ == "Params":
+        kind.__name__ = f"Params_{module.__name__.rpartition('.')[2]}"
+
+
+def planner_files() -> list[str]:
+    """Return the names of the modules in the planners' folder."""
+    import swarmscope.onboard.planning as folder
+
+    return [f"{folder.__name__}.{m.name}" for m in pkgutil.iter_modules(folder.__path__)]
+
+
+def all_planners() -> dict[str, Planner]:
+    """Return every planner by its name, in alphabetical order."""
+    found = {p.name: p for file in planner_files() for p in planners_in(importlib.import_module(file))}
+    return dict(sorted(found.items()))
+
+
+def planner_names() -> list[str]:
+    """Return the names of all planners."""
+    return list(all_planners())
+
+
+def load_planner(name: str) -> Planner:
+    """Return the planner ``name``; raises UnknownNameError with the nearest name."""
+    own_file = [file for file in planner_files() if file.rpartition(".")[2] == name.replace("-", "_")]
+    for file in own_file or planner_files():
+        for planner in planners_in(importlib.import_module(file)):
+            if planner.name == name:
+                return planner
+    raise UnknownNameError("planner", name, planner_names())

@@ -1,0 +1,43 @@
+"""The states that planners share, and the words in which a robot says why it does what it does.
+
+A planner's own reasons (its file's ``REASONS``) come after the shared ones: the first has the code ``FIRST_OWN``.
+"""
+
+from __future__ import annotations
+
+STATE_NAMES = ("advance", "decide", "follow", "yield", "arrived", "escape", "crashed")
+ADVANCE, DECIDE, FOLLOW, YIELD, ARRIVED, ESCAPE, CRASHED = range(7)
+
+REASON_NAMES = (
+    "target direction is safe",
+    "final approach: the way to the goal is free",
+    "waits for the answers of neighbours",
+    "obstacle ahead: chose a side with the neighbours' features",
+    "obstacle ahead: chose a side alone",
+    "follows the obstacle on the chosen side",
+    "dead end: no safe direction, uses the narrower gaps that its body fits through",
+    "loop noticed: follows the border until closer to the goal than ever",
+    "no way out in sight: moves away from the nearest obstacle",
+    "waits for a neighbour to pass",
+    "stands still: no direction is free",
+    "arrived at the goal",
+    "guard: slowed down to keep its braking distance",
+    "collided",
+)
+(
+    R_FREE,
+    R_FINAL,
+    R_ANSWERS,
+    R_FUSED,
+    R_ALONE,
+    R_FOLLOW,
+    R_DEAD_END,
+    R_LOOP,
+    R_LOST,
+    R_YIELD,
+    R_BLOCKED_WAIT,
+    R_ARRIVED,
+    R_GUARD,
+    R_COLLIDED,
+) = range(14)
+FIRST_OWN = len(REASON_NAMES)

@@ -1,0 +1,120 @@
+"""Everything constant that a robot's kernels need: body, protection model, sensor, rules, tables."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from swarmscope.onboard.body import Body, Protection, protection_model
+from swarmscope.onboard.perception.filters import feature_filter, window_half
+from swarmscope.onboard.perception.safety import Rule, reach_table
+from swarmscope.onboard.sensor import Sensor
+
+AHEAD, NARROW, ESCAPE, PRINTED, FITS = range(5)
+"""Rows of ``Rig.reach``. AHEAD: where planners drive. NARROW: gaps that the body fits through, free for a while.
+ESCAPE: free within r. PRINTED: rule (3), the sector within l_th; it masks the features. FITS: room for the body
+within l_th."""
+
+
+class Guarding(NamedTuple):
+    """What the guard and the footprint keep free."""
+
+    clearance_m: float = 0.02
+    """Kept free around the body by the guard."""
+    footprint_clearance_m: float = 0.03
+    """Added to the body's radius: what is swept."""
+    persistence_s: float = 2.0
+    """How long an unseen neighbour is remembered."""
+    latency_s: float = 0.0
+    """Age of a scan when its command takes effect."""
+
+
+class Safety(NamedTuple):
+    """Which directions are safe (docs/theory.md); sector and no look-ahead is the printed rule."""
+
+    sector: bool = False
+    """Use the sector of rule (3) within l_th."""
+    look_ahead_m: float = 2.0
+    """Directions keep ``margin_m`` from everything up to here."""
+    margin_m: float = 0.04
+    narrow_m: float = 1.2
+    """How far ahead a gap must be free that the body just fits."""
+
+
+class Sharing(NamedTuple):
+    """How features travel."""
+
+    exact_features: bool = False
+    """Send float32 features instead of quantised ones (to measure what quantisation costs)."""
+    max_age_s: float = 1.5
+    """Features older than this are not used."""
+
+
+GUARDING, SAFETY, SHARING = Guarding(), Safety(), Sharing()
+
+
+class Rig(NamedTuple):
+    """The constants of one kind of robot."""
+
+    body: Body
+    protection: Protection
+    sensor: Sensor
+    half: int
+    """alpha/2 in beams."""
+    footprint: float
+    """Radius that is swept: the body's plus a clearance [m]."""
+    guarding: Guarding
+    sharing: Sharing
+    look_ahead: float
+    """Directions are free of obstacles up to here [m]."""
+    reach: np.ndarray
+    """(5, BINS + 2) int16: what a return blocks by each of the rules named above."""
+    cos: np.ndarray
+    """(M,) of each beam."""
+    sin: np.ndarray
+    taps: np.ndarray
+
+
+def make_rig(
+    body: Body,
+    sensor: Sensor,
+    guarding: Guarding = GUARDING,
+    safety: Safety = SAFETY,
+    sharing: Sharing = SHARING,
+) -> Rig:
+    """Return the constants of a robot with ``body`` and ``sensor``; raises ConfigError for an impossible body."""
+    body = Body(*(float(v) for v in body))
+    protection = protection_model(body)
+    angles = sensor.angle_min + sensor.increment * np.arange(sensor.beams)
+    footprint = body.radius_m + guarding.footprint_clearance_m
+    half = window_half(protection.alpha, sensor.increment)
+    rules = _rules(body, protection, safety)
+    reach = np.stack([reach_table(sensor.increment, sensor.range_max, footprint, rule) for rule in rules])
+    return Rig(
+        body=body,
+        protection=protection,
+        sensor=sensor,
+        half=half,
+        footprint=footprint,
+        guarding=Guarding(*(float(v) for v in guarding)),
+        sharing=Sharing(bool(sharing.exact_features), float(sharing.max_age_s)),
+        look_ahead=float(safety.look_ahead_m),
+        reach=reach,
+        cos=np.cos(angles),
+        sin=np.sin(angles),
+        taps=feature_filter(half),
+    )
+
+
+def _rules(body: Body, protection: Protection, safety: Safety) -> tuple[Rule, ...]:
+    """Return the rules AHEAD to FITS."""
+    r, l_th, half_alpha = protection.r, protection.l_th, 0.5 * protection.alpha
+    sector = half_alpha if safety.sector else 0.0
+    return (
+        Rule(l_th, sector, safety.look_ahead_m, body.radius_m + safety.margin_m),
+        Rule(safety.narrow_m or r),
+        Rule(r),
+        Rule(l_th, half_alpha),
+        Rule(l_th),
+    )

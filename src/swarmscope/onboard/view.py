@@ -1,0 +1,140 @@
+"""One robot's tick: everything that its kernels may read and write, and the same for a swarm.
+
+A kernel of one robot is given a ``View``, which holds that robot's rows and nothing of the others: what it wants to
+know of them has to come by radio. A loop over robots holds a ``Swarm`` and takes a view of each in turn.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from swarmscope._jit import jit_paste
+from swarmscope.onboard.percept import DECISION, PERCEPT, Row, new_shared
+from swarmscope.onboard.rig import Rig
+from swarmscope.onboard.sharing.message import MAX_FEATURES
+
+
+class Table(NamedTuple):
+    """Features of a scan: ``angles (K,)`` [rad] and ``distances (K,)`` [m] of its extrema, ascending in the angle."""
+
+    angles: np.ndarray
+    distances: np.ndarray
+
+
+class View(NamedTuple):
+    """What one robot has in one tick. M beams."""
+
+    scan: np.ndarray
+    """(M,) float32: ranges as measured [m]; inf = no return, NaN = broken."""
+    masked: np.ndarray
+    """(M,) float32: the scan without moving neighbours."""
+    safe: np.ndarray
+    """(M,) uint8: 1 for each beam direction that is safe (rule AHEAD)."""
+    own: Table
+    """Our own features, compass frame."""
+    percept: Row
+    """What the robot is told in this tick (``PERCEPT``)."""
+    shared: Row
+    """What it remembers of the others and of its own way (``SHARED``)."""
+    out: Row
+    """What it decides (``DECISION``)."""
+    rig: Rig
+    narrow: np.ndarray
+    """(M,) uint8: scratch for directions by another rule."""
+    edges: np.ndarray
+    """(M + 1,) int16: scratch of whoever counts beams."""
+    padded: np.ndarray
+    """(M + 2 half,) float32: scratch of the filter."""
+    filtered: np.ndarray
+    """(M,) float32: the filtered scan, scratch where no features are wanted."""
+    other: Table
+    """Scratch for somebody's features."""
+    header: np.ndarray
+    """(5,) int64: scratch of the decoder."""
+
+
+class Swarm(NamedTuple):
+    """The same for N robots, a row each."""
+
+    scans: np.ndarray
+    masked: np.ndarray
+    safe: np.ndarray
+    own: Table
+    percepts: np.ndarray
+    shared: np.ndarray
+    decisions: np.ndarray
+    rig: Rig
+    narrow: np.ndarray
+    edges: np.ndarray
+    padded: np.ndarray
+    filtered: np.ndarray
+    other: Table
+    header: np.ndarray
+
+
+def _table(robots: int) -> Table:
+    return Table(np.zeros((robots, MAX_FEATURES)), np.zeros((robots, MAX_FEATURES)))
+
+
+def new_swarm(robots: int, rig: Rig) -> Swarm:
+    """Return the rows of ``robots`` robots that have seen nothing yet, their addresses 0, 1, ..."""
+    beams = rig.sensor.beams
+    percepts, decisions = np.zeros(robots, PERCEPT), np.zeros(robots, DECISION)
+    percepts["id"] = np.arange(robots)
+    decisions["p_self"] = decisions["p_left"] = np.nan
+    return Swarm(
+        scans=np.full((robots, beams), np.inf, np.float32),
+        masked=np.zeros((robots, beams), np.float32),
+        safe=np.zeros((robots, beams), np.uint8),
+        own=_table(robots),
+        percepts=percepts,
+        shared=new_shared(robots),
+        decisions=decisions,
+        rig=rig,
+        narrow=np.zeros((robots, beams), np.uint8),
+        edges=np.zeros((robots, beams + 1), np.int16),
+        padded=np.zeros((robots, beams + 2 * rig.half), np.float32),
+        filtered=np.zeros((robots, beams), np.float32),
+        other=_table(robots),
+        header=np.zeros((robots, 5), np.int64),
+    )
+
+
+@jit_paste
+def view_of(swarm: Swarm, i: int) -> View:
+    """Return what robot ``i`` may read and write."""
+    return View(
+        swarm.scans[i],
+        swarm.masked[i],
+        swarm.safe[i],
+        Table(swarm.own.angles[i], swarm.own.distances[i]),
+        swarm.percepts[i],
+        swarm.shared[i],
+        swarm.decisions[i],
+        swarm.rig,
+        swarm.narrow[i],
+        swarm.edges[i],
+        swarm.padded[i],
+        swarm.filtered[i],
+        Table(swarm.other.angles[i], swarm.other.distances[i]),
+        swarm.header[i],
+    )
+
+
+def python_view(swarm: Swarm, i: int) -> View:
+    """Return the same to Python; writing into its rows writes into the swarm's."""
+    view: View = getattr(view_of, "py_func", view_of)(swarm, i)
+    return view
+
+
+def arrays_of(swarm: Swarm) -> list[np.ndarray]:
+    """Return every array of a swarm's robots, a row each."""
+    found: list[np.ndarray] = []
+    for part in swarm:
+        if isinstance(part, Table):
+            found += part
+        elif isinstance(part, np.ndarray):
+            found.append(part)
+    return found
