@@ -11,7 +11,6 @@ from swarmscope.onboard.body import Body
 from swarmscope.onboard.percept import DECISION, PERCEPT, new_shared
 from swarmscope.onboard.rig import make_rig
 from swarmscope.onboard.sensor import Sensor
-from swarmscope.onboard.view import new_swarm
 from swarmscope.sim.lidar import cast_static, make_beams
 from swarmscope.sim.state import Clock, Noise, Radio, new_sim
 from swarmscope.sim.world import Circle, WorldSpec, compile_world
