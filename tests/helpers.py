@@ -5,21 +5,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from hypothesis import settings
 
 from swarmscope.onboard.body import Body
 from swarmscope.onboard.percept import DECISION, PERCEPT, new_shared
 from swarmscope.onboard.rig import make_rig
 from swarmscope.onboard.sensor import Sensor
-from swarmscope.onboard.view import new_swarm
 from swarmscope.sim.lidar import cast_static, make_beams
 from swarmscope.sim.state import Clock, Noise, Radio, new_sim
 from swarmscope.sim.world import Circle, WorldSpec, compile_world
-
-settings.register_profile(
-    "kernels", deadline=None, derandomize=True
-)  # the first call of a kernel compiles it
-settings.load_profile("kernels")
 
 DT = 0.2
 BOUNDS = (-10.0, -10.0, 10.0, 10.0)

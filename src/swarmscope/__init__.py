@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from swarmscope.api import Run, load_run, simulate
-    from swarmscope.onboard.body import Body, Lidar  # type: ignore[attr-defined, unused-ignore]
+    from swarmscope.onboard.body import Body
+    from swarmscope.onboard.lidar import Lidar  # type: ignore[import-not-found, unused-ignore]
     from swarmscope.onboard.robot import (  # type: ignore[import-not-found, unused-ignore]
         Command,
         Robot,
@@ -25,7 +26,7 @@ __all__ = ["Body", "Command", "Lidar", "Robot", "Run", "Seen", "load_run", "load
 HOMES = {
     "Body": "swarmscope.onboard.body",
     "Command": "swarmscope.onboard.robot",
-    "Lidar": "swarmscope.onboard.body",
+    "Lidar": "swarmscope.onboard.lidar",
     "Robot": "swarmscope.onboard.robot",
     "Run": "swarmscope.api",
     "Seen": "swarmscope.onboard.robot",

@@ -13,7 +13,6 @@ from swarmscope.cli.perceive import SCAN_FOLDER
 from swarmscope.errors import ConfigError, InputFileError
 from swarmscope.experiments.perceive import perceive, write_features
 from swarmscope.onboard.percept import PERCEPT
-from swarmscope.onboard.view import new_swarm
 from swarmscope.onboard.perception.safety import safe_directions
 from swarmscope.onboard.tick import features
 from swarmscope.sim.scan_files import ScanLog, load_scans

@@ -10,10 +10,9 @@ import pytest
 from pydantic import BaseModel
 
 from swarmscope.onboard.body import Body
-from swarmscope.onboard.percept import make_rig
+from swarmscope.onboard.rig import Guarding, Safety, Sharing, make_rig
 from swarmscope.scenarios.places import make_setup
 from swarmscope.scenarios.scenario import (
-    RIG,
     GuardModel,
     LidarModel,
     MapModel,
@@ -58,9 +57,9 @@ def test_the_rig_of_a_scenario_is_the_one_of_a_robot():
     ("model", "kernels"),
     [
         (RobotModel, Body()._asdict()),
-        (RadioModel, Radio()._asdict() | {"exact_features": RIG["exact_features"]}),
-        (GuardModel, RIG),
-        (SafetyModel, RIG),
+        (RadioModel, Radio()._asdict() | Sharing()._asdict()),
+        (GuardModel, Guarding()._asdict()),
+        (SafetyModel, Safety()._asdict()),
     ],
 )
 def test_each_default_of_the_schema_is_the_one_of_the_tuple(model, kernels):

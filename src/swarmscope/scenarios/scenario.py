@@ -27,6 +27,8 @@ NOISE: Final = Noise()
 RADIO: Final = Radio()
 GUARDING: Final = Guarding()
 SAFETY: Final = Safety()
+SHARING: Final = Sharing()
+"""What robots run on when nobody says otherwise."""
 
 
 class _Strict(BaseModel):
@@ -91,7 +93,7 @@ class RadioModel(_Strict):
     """Share of packets that are lost by chance."""
     bitrate_bps: Positive = RADIO.bitrate_bps
     """Bandwidth of a robot's radio: a packet occupies sender and receiver for its bits over this [bit/s]."""
-    exact_features: bool = Sharing().exact_features
+    exact_features: bool = SHARING.exact_features
     """Send features as float32 instead of bytes (to measure what quantisation costs)."""
 
 

@@ -9,7 +9,6 @@ import pytest
 
 from helpers import DT, Rows, circle, circles_world, place_scenario, rig_of, run_scenario, scan_at, wall
 from swarmscope.onboard.planning import dh_bug
-from swarmscope.onboard.reasons import DECIDE, YIELD
 from swarmscope.onboard.planning.dh_bug import (
     AT_GOAL,
     KEY_POINT,
@@ -29,6 +28,7 @@ from swarmscope.onboard.planning.dh_bug import (
     Params,
     toss,
 )
+from swarmscope.onboard.reasons import DECIDE, YIELD
 
 BIG = [(2.3, 0.0, 2.0)]
 """0.3 m ahead and so wide that no direction within 80 degrees of the goal's is safe."""

@@ -10,6 +10,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from helpers import Rows, rig_of
+from swarmscope.onboard.deciding.choosing import choose_side, own_probability
 from swarmscope.onboard.deciding.fields import (
     following_probability,
     fuse,
@@ -20,7 +21,6 @@ from swarmscope.onboard.deciding.fields import (
     sigmoid,
     yields_to,
 )
-from swarmscope.onboard.deciding.choosing import choose_side, own_probability
 
 TWO_PI = 2.0 * math.pi
 SIGMA = 0.9

@@ -7,14 +7,10 @@ import math
 import numpy as np
 import onnxruntime
 import pytest
+from swarmscope.onboard.planning._giwt import Params
 
 from giwt_models import make_model
 from helpers import DT, Rows, circle, circles_world, place_scenario, rig_of, run_scenario, scan_at
-from swarmscope.onboard.percept import MAX_OUTBOX
-from swarmscope.onboard.network.local_map import CELL_ANGLE, CELL_DISTANCE, draw_map, encode_scan, hide_robot
-from swarmscope.onboard.planning import giwt, giwt_cnn
-from swarmscope.onboard.reasons import R_ALONE, R_ANSWERS, R_FUSED
-from swarmscope.onboard.planning._giwt import Params
 from swarmscope.onboard.network.graph import (
     OWN_CELL,
     VIEW_M,
@@ -23,6 +19,10 @@ from swarmscope.onboard.network.graph import (
     quantise,
     restore,
 )
+from swarmscope.onboard.network.local_map import CELL_ANGLE, CELL_DISTANCE, draw_map, encode_scan, hide_robot
+from swarmscope.onboard.percept import MAX_OUTBOX
+from swarmscope.onboard.planning import giwt, giwt_cnn
+from swarmscope.onboard.reasons import R_ALONE, R_ANSWERS, R_FUSED
 from swarmscope.onboard.sharing.message import (
     KIND_DIRECTED_REQUEST,
     KIND_LATENT,

@@ -11,8 +11,8 @@ from onnx import TensorProto
 
 from giwt_models import decider, encoder, make_model, port, write_card
 from swarmscope.errors import InputFileError, MissingExtraError
-from swarmscope.onboard.planning import giwt
 from swarmscope.onboard.network.model import load_network, read_card
+from swarmscope.onboard.planning import giwt
 
 
 @pytest.fixture

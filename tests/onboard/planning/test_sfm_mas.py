@@ -10,9 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from helpers import Rows, circle, circles_world, place_scenario, rig_of, run_scenario, scan_at, wall
-from swarmscope.onboard.perception.areas import normalise, passable_distance
-from swarmscope.onboard.planning import nav_scope, sfm_i, sfm_mas
-from swarmscope.onboard.reasons import ADVANCE, DECIDE, FOLLOW, YIELD
+from swarmscope.onboard.deciding.choosing import own_probability
 from swarmscope.onboard.deciding.fields import (
     following_probability,
     fuse,
@@ -23,8 +21,10 @@ from swarmscope.onboard.deciding.fields import (
     propulsion,
     yields_to,
 )
-from swarmscope.onboard.deciding.choosing import own_probability
+from swarmscope.onboard.perception.areas import normalise, passable_distance
+from swarmscope.onboard.planning import nav_scope, sfm_i, sfm_mas
 from swarmscope.onboard.planning.sfm_mas import goes_first, obstacle_stops
+from swarmscope.onboard.reasons import ADVANCE, DECIDE, FOLLOW, YIELD
 
 L_TH = 0.6
 HALF = math.radians(30.0)
