@@ -61,7 +61,7 @@ def compiled(path: Path, change: Callable[[ast.Module], ast.Module] | None = Non
             return compile(text, str(path), "exec", dont_inherit=True)
         return compile(change(ast.parse(text, str(path))), str(path), "exec", dont_inherit=True)
     except SyntaxError as error:
-        raise InputFileError(path, f"is not Python: line {error.lineno}: {error.msg}") from None
+        raise InputFileError(path, _not_python(error)) from None
     except (ValueError, RecursionError, MemoryError) as error:
         raise InputFileError(path, f"is not Python: {one_line(error)}") from None
 
@@ -126,11 +126,16 @@ def guarded(call: Callable[[], Result], path: Path) -> Result:
 def _where(error: BaseException, path: Path) -> tuple[Path, str]:
     """Return the file in which something was raised, the user's own rather than a library's, and what."""
     if isinstance(error, SyntaxError) and error.filename:
-        return Path(error.filename), f"is not Python: line {error.lineno}: {error.msg}"
+        return Path(error.filename), _not_python(error)
     frames = [Path(frame.filename) for frame in traceback.extract_tb(error.__traceback__)]
     beside = [file for file in frames if file == path or (file.parent == path.parent and file.suffix == ".py")]
     file = beside[-1] if beside else path
     return file, raised(error, file)
+
+
+def _not_python(error: SyntaxError) -> str:
+    place = f"line {error.lineno}: " if error.lineno else ""
+    return f"is not Python: {place}{' '.join(str(error.msg).split())}"
 
 
 def raised(error: BaseException, path: Path) -> str:

@@ -9,16 +9,16 @@ import subprocess
 from functools import cache
 from pathlib import Path
 
-import swarmscope
+from swarmscope import __version__, closure
 
-PACKAGE = Path(swarmscope.__file__).resolve().parent
+PACKAGE = Path(closure.PACKAGE)
 GIT_SECONDS = 10.0
 
 
 def versions() -> dict[str, str]:
     """Return the versions that can change a result, without importing the packages."""
     return {
-        "swarmscope": swarmscope.__version__,
+        "swarmscope": __version__,
         "python": platform.python_version(),
         "numpy": installed_version("numpy"),
         "numba": installed_version("numba"),

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from swarmscope.errors import ConfigError
-from swarmscope.scenarios.scenario import Scenario
 from swarmscope.sim.maps import load_map, packaged_map
 from swarmscope.sim.world import WorldSpec
 from swarmscope.tasks import Setup, check_setup, place_on_map, setup_of_task
+
+if TYPE_CHECKING:  # what a scenario says elsewhere changes no place
+    from swarmscope.scenarios.scenario import Scenario
 
 
 def make_setup(scenario: Scenario) -> Setup:
