@@ -178,7 +178,7 @@ def test_settings_reach_the_kernels_in_their_units():
     assert (setting.dt, setting.limit_s, setting.seed, setting.threads) == (0.1, 12.0, 9, 2)
     rig = make_rig_of(scenario)
     assert (rig.sensor.beams, rig.sensor.range_max, rig.sensor.wraps) == (90, 8.0, False)
-    assert (rig.body.radius_m, rig.body.v_max_mps, rig.clearance) == (0.2, 0.4, 0.05)
+    assert (rig.body.radius_m, rig.body.v_max_mps, rig.guarding.clearance_m) == (0.2, 0.4, 0.05)
 
 
 @pytest.mark.parametrize(("robots", "choice", "kept"), [(2, "auto", True), (2000, "auto", False), (2, "no", False)])
