@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmscope.errors import ConfigError, InputFileError, SwarmscopeError, UnknownNameError
-from swarmscope.onboard.planning.dh_bug import toss
+from swarmscope.onboard.deciding.bug import toss
 from swarmscope.scenarios.read import load_scenario, map_path, parse_scenario
 from swarmscope.scenarios.scenario import Scenario
 from swarmscope.scenarios.to_kernels import complete, make_rig_of, make_setting, make_setup, task_options

@@ -24,7 +24,8 @@ def find(values, safe=None, wraps=True, room=MAX_FEATURES):
     """Extrema of a filtered scan as [(beam, distance)], beams counted from angle_min."""
     values = np.asarray(values, np.float32)
     increment = TWO_PI / len(values) if wraps else math.radians(1.0)
-    sensor = make_sensor(range_max=RANGE_MAX)._replace(beams=len(values), angle_min=-math.pi, increment=increment, wraps=wraps)
+    sensor = make_sensor(len(values), range_max=RANGE_MAX)
+    sensor = sensor._replace(angle_min=-math.pi, increment=increment, wraps=wraps)
     safe = np.ones(len(values), np.uint8) if safe is None else np.asarray(safe, np.uint8)
     angles, distances = np.full(room, np.nan), np.full(room, np.nan)
     count = extrema(values, safe, sensor, angles, distances)
