@@ -12,7 +12,6 @@ torch = pytest.importorskip("torch")
 pytest.importorskip("torch_geometric")
 
 from safetensors.torch import save  # noqa: E402
-from swarmscope.onboard.planning._giwt import draw  # noqa: E402
 
 from swarmscope.errors import ConfigError, InputFileError, SwarmscopeError  # noqa: E402
 from swarmscope.learning import checkpoints, export, models, train  # noqa: E402
