@@ -87,9 +87,8 @@ def _circle(order: np.ndarray, first: float, reach: float) -> Layout:
     count = order.size
     step = TWO_PI / count
     first = first - TWO_PI * math.floor((first + math.pi) / TWO_PI + 1e-12)
-    skip = math.ceil((math.pi - first) / step - 1e-3) % count
-    if skip:
-        first += skip * step - TWO_PI
+    skip = math.ceil((math.pi - first) / step - 1e-3)
+    first += skip * step - TWO_PI
     if abs(first + math.pi) < 1e-9:
         first = -math.pi
     return Layout(Rays(first, step, True, reach), np.roll(order, -skip))

@@ -13,8 +13,8 @@ from swarmscope.onboard.perception.reproject import Seat, reproject, settle
 from swarmscope.onboard.trail import Pose, Trail, then
 
 MOST_READINGS = 8192
-STALE_PERIODS = 3.0
-"""Older scans are not used."""
+STALE_PERIODS = 3.05
+"""Older scans are not used: three periods, and a little for rounding."""
 AHEAD_PERIODS = 0.5
 """A scan may be stamped this much later than the tick."""
 NEAR_M, NEAR_STEPS = 0.002, 0.25
@@ -50,8 +50,7 @@ class Scans:
         if stamp <= self._stamp_s:
             return
         self.forget()
-        if now_s - stamp > STALE_PERIODS * self._period_s:
-            raise Unusable("stale scan", f"the scan is {now_s - stamp:.3g} s old")
+        self._check_age(now_s - stamp)
         layout, count, least = self._sheet, self._lidar.beams, self._lidar.range_min_m
         if hasattr(scan, "angle_increment"):
             scan, layout, count, least = self._laser_scan(scan)
@@ -71,9 +70,7 @@ class Scans:
         """Write what is seen from where the robot is now into ``out (M,)`` float32; raises Unusable."""
         if self._stamp_s == -math.inf:
             raise Unusable("no scan", "there is no scan")
-        age = now_s - self._stamp_s
-        if age > STALE_PERIODS * self._period_s:
-            raise Unusable("stale scan", f"the scan is {age:.3g} s old")
+        self._check_age(now_s - self._stamp_s)
         back = trail.back_to(self._stamp_s)
         if back is None:
             raise Unusable("moved", "how the robot has moved since the scan is not known")
@@ -83,6 +80,10 @@ class Scans:
         x, y, _ = then(back, (*self._lidar.mount[:2], 0.0))
         seat = Seat(x, y, back[2], back[0], back[1], self._core_m)
         reproject(self._scan, self._layout.rays, seat, self.grid.rays, out)
+
+    def _check_age(self, age_s: float) -> None:
+        if age_s > STALE_PERIODS * self._period_s:
+            raise Unusable("stale scan", f"the scan is {age_s:.3g} s old")
 
     def _stamp(self, scan: Any, scan_s: Any, now_s: float) -> float:
         """Return when the scan was taken [s]."""

@@ -35,6 +35,14 @@ class Seat(NamedTuple):
     """What lies closer than this to the body's centre, then or now, is the robot itself [m]."""
 
 
+class End(NamedTuple):
+    """A point of the border [m] and its bearing [rad], from where we are."""
+
+    x: float
+    y: float
+    bearing: float
+
+
 @jit
 def settle(raw: np.ndarray, order: np.ndarray, least: float, most: float, out: np.ndarray) -> int:
     """Write reading ``order[n]`` of ``raw (B,)`` into ``out[n]``, all (M,) float32 [m]; return how many are sound.
@@ -61,34 +69,34 @@ def reproject(scan: np.ndarray, rays: Rays, seat: Seat, grid: Rays, out: np.ndar
     for n in range(out.size):
         out[n] = np.nan
     total = scan.size
-    for k in range(total if rays.closed else total - 1):
-        j = k + 1 if k + 1 < total else 0
-        _join(scan, k, j, rays, seat, grid, out)
+    first = before = _end(scan[0], 0, rays, seat)
     for k in range(total):
-        at_edge = not rays.closed and k in (0, total - 1)
-        if not scan[k] >= 0.0 or at_edge:
+        end = _end(scan[k], k, rays, seat)
+        if k > 0:
+            _join(scan[k - 1], scan[k], before, end, grid, out)
+        if not scan[k] >= 0.0 or (not rays.closed and k in (0, total - 1)):
             _wall(rays.start + seat.yaw + k * rays.increment, rays.reach, seat, grid, out)
         if scan[k] < np.inf:
-            x, y = _end(scan, k, rays, seat)
-            _dot(x, y, grid, out)
+            _dot(end, grid, out)
+        before = end
+    if rays.closed:
+        _join(scan[total - 1], scan[0], before, first, grid, out)
 
 
 @jit_inner
-def _end(scan: np.ndarray, k: int, rays: Rays, seat: Seat) -> tuple[float, float]:
-    """Return where ray k ends [m]."""
+def _end(s: float, k: int, rays: Rays, seat: Seat) -> End:
+    """Return where ray k of range ``s`` ends."""
     angle = rays.start + seat.yaw + k * rays.increment
-    s = min(scan[k], rays.reach)
-    return seat.x + s * math.cos(angle), seat.y + s * math.sin(angle)
+    s = min(s, rays.reach)
+    x, y = seat.x + s * math.cos(angle), seat.y + s * math.sin(angle)
+    return End(x, y, math.atan2(y, x))
 
 
 @jit_inner
-def _join(scan: np.ndarray, k: int, j: int, rays: Rays, seat: Seat, grid: Rays, out: np.ndarray) -> None:
-    """Draw the border between the ends of rays k and j; where both saw nothing there is none."""
-    if not (scan[k] >= 0.0 and scan[j] >= 0.0):
-        return
-    ax, ay = _end(scan, k, rays, seat)
-    bx, by = _end(scan, j, rays, seat)
-    _draw(ax, ay, bx, by, scan[k] < np.inf or scan[j] < np.inf, grid, out)
+def _join(range_a: float, range_b: float, a: End, b: End, grid: Rays, out: np.ndarray) -> None:
+    """Draw the border between the ends of two rays; where both saw nothing there is none."""
+    if range_a >= 0.0 and range_b >= 0.0:
+        _draw(a, b, range_a < np.inf or range_b < np.inf, grid, out)
 
 
 @jit_inner
@@ -98,8 +106,10 @@ def _wall(angle: float, reach: float, seat: Seat, grid: Rays, out: np.ndarray) -
     begin = max(_leaves(dx, dy, -seat.x, -seat.y, seat.core), 0.0)
     begin = max(begin, _leaves(dx, dy, seat.body_x - seat.x, seat.body_y - seat.y, seat.core))
     ax, ay = seat.x + begin * dx, seat.y + begin * dy
-    _draw(ax, ay, seat.x + reach * dx, seat.y + reach * dy, True, grid, out)
-    _dot(ax, ay, grid, out)
+    bx, by = seat.x + reach * dx, seat.y + reach * dy
+    a = End(ax, ay, math.atan2(ay, ax))
+    _draw(a, End(bx, by, math.atan2(by, bx)), True, grid, out)
+    _dot(a, grid, out)
 
 
 @jit_inner
@@ -111,58 +121,56 @@ def _leaves(dx: float, dy: float, cx: float, cy: float, radius: float) -> float:
 
 
 @jit_inner
-def _dot(x: float, y: float, grid: Rays, out: np.ndarray) -> None:
-    """Lower the ray nearest to (x, y)."""
-    n = int(math.floor(_offset(math.atan2(y, x), grid) + 0.5))
+def _dot(a: End, grid: Rays, out: np.ndarray) -> None:
+    """Lower the ray nearest to a point."""
+    n = int(math.floor(_offset(a.bearing, grid) + 0.5))
     if grid.closed:
         n %= out.size
     if 0 <= n < out.size:
-        _lower(out, n, math.sqrt(x * x + y * y))
+        _lower(out, n, math.sqrt(a.x * a.x + a.y * a.y))
 
 
 @jit_inner
-def _draw(ax: float, ay: float, bx: float, by: float, solid: bool, grid: Rays, out: np.ndarray) -> None:
+def _draw(a: End, b: End, solid: bool, grid: Rays, out: np.ndarray) -> None:
     """Lower every ray that meets a-b; one that is not ``solid`` only shows that nothing was seen there."""
-    angle_a, angle_b = math.atan2(ay, ax), math.atan2(by, bx)
-    width = wrap_angle(angle_b - angle_a)
-    if abs(width) > ON_BORDER:
-        for n in range(out.size):
-            _meet(ax, ay, bx, by, solid, n, grid, out)
-        return
-    low = _offset(angle_a if width >= 0.0 else angle_b, grid)
-    high = low + abs(width) / grid.increment
+    width = wrap_angle(b.bearing - a.bearing)
+    low, high = 0.0, out.size - 1.0
+    if abs(width) <= ON_BORDER:
+        low = _offset(a.bearing if width >= 0.0 else b.bearing, grid)
+        high = low + abs(width) / grid.increment
     for k in range(int(math.ceil(low - 1e-6)), int(math.floor(high + 1e-6)) + 1):
         n = k % out.size if grid.closed else k
         if 0 <= n < out.size:
-            _meet(ax, ay, bx, by, solid, n, grid, out)
+            _lower(out, n, _meet(a, b, n, grid) if solid else np.inf)
 
 
 @jit_inner
-def _meet(ax: float, ay: float, bx: float, by: float, solid: bool, n: int, grid: Rays, out: np.ndarray) -> None:
-    """Lower ray n where it meets a-b."""
-    if not solid:
-        _lower(out, n, np.inf)
-        return
+def _meet(a: End, b: End, n: int, grid: Rays) -> float:
+    """Return the range of ray n to a-b, inf beyond the longest range, NaN when a-b is behind it."""
     angle = grid.start + n * grid.increment
-    s = ray_segment(math.cos(angle), math.sin(angle), ax, ay, bx, by)
+    dx, dy = math.cos(angle), math.sin(angle)
+    s = ray_segment(dx, dy, a.x, a.y, b.x, b.y)
     if s == np.inf:  # by rounding: it passes an end
-        s = min(math.sqrt(ax * ax + ay * ay), math.sqrt(bx * bx + by * by)) if _faces(angle, ax, ay, bx, by) else np.nan
-    if s <= grid.reach:
-        _lower(out, n, s)
-    elif s > grid.reach:
-        _lower(out, n, np.inf)
+        s = _passed(a, b, dx, dy)
+    return s if not s > grid.reach - 1e-6 else np.inf
 
 
 @jit_inner
-def _faces(angle: float, ax: float, ay: float, bx: float, by: float) -> bool:
-    """Tell whether a-b is not behind a ray."""
-    return (ax + bx) * math.cos(angle) + (ay + by) * math.sin(angle) > 0.0
+def _passed(a: End, b: End, dx: float, dy: float) -> float:
+    """Return the range to the end of a-b that a ray along unit direction d passes, NaN when a-b is behind it."""
+    if (a.x + b.x) * dx + (a.y + b.y) * dy <= 0.0:
+        return np.nan
+    far_a, far_b = math.sqrt(a.x * a.x + a.y * a.y), math.sqrt(b.x * b.x + b.y * b.y)
+    off_a, off_b = abs(a.x * dy - a.y * dx) * far_b, abs(b.x * dy - b.y * dx) * far_a
+    if abs(off_a - off_b) < 1e-5 * far_a * far_b:
+        return min(far_a, far_b)
+    return far_a if off_a < off_b else far_b
 
 
 @jit_inner
 def _lower(out: np.ndarray, n: int, s: float) -> None:
-    """Make ``s`` the range of ray n if it is shorter, or the first."""
-    if not out[n] <= s:
+    """Make ``s`` the range of ray n if it is shorter, or the first; NaN says nothing."""
+    if s >= 0.0 and not out[n] <= s:
         out[n] = s
 
 
