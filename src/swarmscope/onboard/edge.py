@@ -57,9 +57,9 @@ def number(value: Any) -> float:
     """Return ``value`` as a float, NaN for what is no number."""
     if type(value) is float:
         return value
-    if isinstance(value, str | bytes | bytearray) or getattr(value, "ndim", 0) != 0:
-        return math.nan
     try:
+        if isinstance(value, str | bytes | bytearray) or getattr(value, "ndim", 0) != 0:
+            return math.nan
         return float(value)
     except Exception:  # whatever a stranger's __float__ raises
         return math.nan

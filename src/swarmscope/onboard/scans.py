@@ -89,9 +89,7 @@ class Scans:
         """Return when the scan was taken [s]."""
         stamp = now_s if scan_s is None else number(scan_s)
         if scan_s is None:
-            header = getattr(getattr(scan, "header", None), "stamp", None)
-            seconds = number(getattr(header, "sec", 0)) + 1e-9 * number(getattr(header, "nanosec", 0))
-            stamp = seconds if seconds != 0.0 else now_s
+            stamp = _header_stamp(scan) or now_s
         if not math.isfinite(stamp):
             self.forget()
             raise Unusable("scan stamp", f"scan_s must be a time [s], not {short(scan_s)}")
@@ -132,6 +130,14 @@ class Scans:
 
 def _is_here(back: Pose, increment: float) -> bool:
     return math.hypot(back[0], back[1]) <= NEAR_M and abs(back[2]) <= NEAR_STEPS * increment
+
+
+def _header_stamp(scan: Any) -> float:
+    """Return the stamp of a LaserScan's header [s], 0 when it has none."""
+    if not hasattr(scan, "angle_increment"):
+        return 0.0
+    stamp = getattr(getattr(scan, "header", None), "stamp", None)
+    return number(getattr(stamp, "sec", 0)) + 1e-9 * number(getattr(stamp, "nanosec", 0))
 
 
 def _length(scan: Any) -> int:
