@@ -9,7 +9,7 @@ import numpy as np
 
 from swarmscope.onboard.edge import Unusable, number, readings, short
 from swarmscope.onboard.lidar import Layout, Lidar, grid_of, lay_out, layout_of, same_rays
-from swarmscope.onboard.perception.reproject import Seat, reproject, settle
+from swarmscope.onboard.perception.reproject import Grid, Seat, reproject, settle
 from swarmscope.onboard.trail import Pose, Trail, then
 
 MOST_READINGS = 8192
@@ -28,6 +28,8 @@ class Scans:
         self._lidar, self._period_s, self._core_m = lidar, period_s, core_m
         self._sheet = self._layout = layout_of(lidar)
         self.grid = grid_of(self._sheet)
+        angles = self.grid.rays.start + self.grid.rays.increment * np.arange(self.grid.order.size)
+        self._wanted = Grid(self.grid.rays, np.cos(angles), np.sin(angles))
         self._direct = same_rays(self._sheet, self.grid)
         self._header: tuple[float, ...] = ()
         self._told = self._sheet
@@ -79,7 +81,7 @@ class Scans:
             return
         x, y, _ = then(back, (*self._lidar.mount[:2], 0.0))
         seat = Seat(x, y, back[2], back[0], back[1], self._core_m)
-        reproject(self._scan, self._layout.rays, seat, self.grid.rays, out)
+        reproject(self._scan, self._layout.rays, seat, self._wanted, out)
 
     def _check_age(self, age_s: float) -> None:
         if age_s > STALE_PERIODS * self._period_s:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from helpers import beams_of, circles_world, make_sensor, rig_of, scan_at
 from swarmscope.onboard.lidar import Rays
-from swarmscope.onboard.perception.reproject import Seat, reproject, settle
+from swarmscope.onboard.perception.reproject import Grid, Seat, reproject, settle
 from swarmscope.sim.lidar import cast_static, make_beams
 
 RIG = rig_of()
@@ -30,7 +30,8 @@ def world_and_seat(seed, away=0.3):
 
 def moved(scan, seat, rays=CIRCLE, grid=CIRCLE, size=360):
     out = np.empty(size, np.float32)
-    reproject(scan, rays, seat, grid, out)
+    angles = grid.start + grid.increment * np.arange(size)
+    reproject(scan, rays, seat, Grid(grid, np.cos(angles), np.sin(angles)), out)
     return out
 
 

@@ -35,6 +35,15 @@ class Seat(NamedTuple):
     """What lies closer than this to the body's centre, then or now, is the robot itself [m]."""
 
 
+class Grid(NamedTuple):
+    """The rays that are wanted."""
+
+    rays: Rays
+    cos: np.ndarray
+    """(M,) of their directions."""
+    sin: np.ndarray
+
+
 class End(NamedTuple):
     """A point of the border [m] and its bearing [rad], from where we are."""
 
@@ -61,7 +70,7 @@ def settle(raw: np.ndarray, order: np.ndarray, least: float, most: float, out: n
 
 
 @jit
-def reproject(scan: np.ndarray, rays: Rays, seat: Seat, grid: Rays, out: np.ndarray) -> None:
+def reproject(scan: np.ndarray, rays: Rays, seat: Seat, grid: Grid, out: np.ndarray) -> None:
     """Write ``scan (B,)``, taken from ``seat`` along ``rays``, into ``out (M,)`` along ``grid`` round where we are.
 
     Both are float32 [m], +inf for no return, NaN for broken readings.
@@ -74,13 +83,23 @@ def reproject(scan: np.ndarray, rays: Rays, seat: Seat, grid: Rays, out: np.ndar
         end = _end(scan[k], k, rays, seat)
         if k > 0:
             _join(scan[k - 1], scan[k], before, end, grid, out)
-        if not scan[k] >= 0.0 or (not rays.closed and k in (0, total - 1)):
+        if _beside_unknown(scan, k, rays.closed):
             _wall(rays.start + seat.yaw + k * rays.increment, rays.reach, seat, grid, out)
         if scan[k] < np.inf:
             _dot(end, grid, out)
         before = end
     if rays.closed:
         _join(scan[total - 1], scan[0], before, first, grid, out)
+
+
+@jit_inner
+def _beside_unknown(scan: np.ndarray, k: int, closed: bool) -> bool:
+    """Tell whether ray k is an edge of what nobody has seen: of a run of broken rays, or of the field."""
+    total = scan.size
+    if not closed and k in (0, total - 1):
+        return True
+    before, after = scan[k - 1 if k > 0 else total - 1], scan[k + 1 if k + 1 < total else 0]
+    return not scan[k] >= 0.0 and (before >= 0.0 or after >= 0.0)
 
 
 @jit_inner
@@ -93,14 +112,14 @@ def _end(s: float, k: int, rays: Rays, seat: Seat) -> End:
 
 
 @jit_inner
-def _join(range_a: float, range_b: float, a: End, b: End, grid: Rays, out: np.ndarray) -> None:
+def _join(range_a: float, range_b: float, a: End, b: End, grid: Grid, out: np.ndarray) -> None:
     """Draw the border between the ends of two rays; where both saw nothing there is none."""
     if range_a >= 0.0 and range_b >= 0.0:
         _draw(a, b, range_a < np.inf or range_b < np.inf, grid, out)
 
 
 @jit_inner
-def _wall(angle: float, reach: float, seat: Seat, grid: Rays, out: np.ndarray) -> None:
+def _wall(angle: float, reach: float, seat: Seat, grid: Grid, out: np.ndarray) -> None:
     """Draw the ray at ``angle`` from where it leaves the robot, then and now, to its end."""
     dx, dy = math.cos(angle), math.sin(angle)
     begin = max(_leaves(dx, dy, -seat.x, -seat.y, seat.core), 0.0)
@@ -121,38 +140,37 @@ def _leaves(dx: float, dy: float, cx: float, cy: float, radius: float) -> float:
 
 
 @jit_inner
-def _dot(a: End, grid: Rays, out: np.ndarray) -> None:
+def _dot(a: End, grid: Grid, out: np.ndarray) -> None:
     """Lower the ray nearest to a point."""
     n = int(math.floor(_offset(a.bearing, grid) + 0.5))
-    if grid.closed:
+    if grid.rays.closed:
         n %= out.size
     if 0 <= n < out.size:
         _lower(out, n, math.sqrt(a.x * a.x + a.y * a.y))
 
 
 @jit_inner
-def _draw(a: End, b: End, solid: bool, grid: Rays, out: np.ndarray) -> None:
+def _draw(a: End, b: End, solid: bool, grid: Grid, out: np.ndarray) -> None:
     """Lower every ray that meets a-b; one that is not ``solid`` only shows that nothing was seen there."""
     width = wrap_angle(b.bearing - a.bearing)
     low, high = 0.0, out.size - 1.0
     if abs(width) <= ON_BORDER:
         low = _offset(a.bearing if width >= 0.0 else b.bearing, grid)
-        high = low + abs(width) / grid.increment
+        high = low + abs(width) / grid.rays.increment
     for k in range(int(math.ceil(low - 1e-6)), int(math.floor(high + 1e-6)) + 1):
-        n = k % out.size if grid.closed else k
+        n = k % out.size if grid.rays.closed else k
         if 0 <= n < out.size:
             _lower(out, n, _meet(a, b, n, grid) if solid else np.inf)
 
 
 @jit_inner
-def _meet(a: End, b: End, n: int, grid: Rays) -> float:
+def _meet(a: End, b: End, n: int, grid: Grid) -> float:
     """Return the range of ray n to a-b, inf beyond the longest range, NaN when a-b is behind it."""
-    angle = grid.start + n * grid.increment
-    dx, dy = math.cos(angle), math.sin(angle)
+    dx, dy = grid.cos[n], grid.sin[n]
     s = ray_segment(dx, dy, a.x, a.y, b.x, b.y)
     if s == np.inf:  # by rounding: it passes an end
         s = _passed(a, b, dx, dy)
-    return s if not s > grid.reach - 1e-6 else np.inf
+    return s if not s > grid.rays.reach - 1e-6 else np.inf
 
 
 @jit_inner
@@ -175,6 +193,6 @@ def _lower(out: np.ndarray, n: int, s: float) -> None:
 
 
 @jit_inner
-def _offset(angle: float, grid: Rays) -> float:
+def _offset(angle: float, grid: Grid) -> float:
     """Return where a direction (within [-pi, pi]) lies, counted in rays."""
-    return (angle - grid.start) / grid.increment
+    return (angle - grid.rays.start) / grid.rays.increment
