@@ -5,7 +5,9 @@ from __future__ import annotations
 import array
 import gc
 import math
+import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -153,7 +155,7 @@ def test_a_sensor_off_the_centre_sees_the_same_world(mount):
     there, here = robot.rows.scan, scan_at(world, rig)
     both = np.isfinite(there) & np.isfinite(here)
     assert both.sum() > 50
-    assert (np.abs(there - here)[both] < 0.05).mean() > 0.8
+    assert (np.abs(there[both] - here[both]) < 0.05).mean() > 0.8
     assert (there <= here + 0.02).mean() > 0.95
 
 
@@ -182,7 +184,7 @@ def test_laser_scans_of_other_geometry_are_turned_into_the_data_sheets():
         assert driver.tick(LaserScan(fine[nearest], first, step)).ok
         there = driver.robot.rows.scan
         both = np.isfinite(there) & np.isfinite(here)
-        assert (np.abs(there - here)[both] < 0.1).mean() > 0.8, beams
+        assert (np.abs(there[both] - here[both]) < 0.1).mean() > 0.8, beams
     assert driver.tick(LaserScan(fine, range_min=0.2)).ok
 
 
@@ -440,3 +442,14 @@ def test_a_robots_memory_does_not_grow():
     blocks()
     before = blocks()
     assert blocks() - before < 200
+
+
+def test_the_example_runs():
+    example = Path(__file__).resolve().parents[2] / "examples" / "robot.py"
+    done = subprocess.run([sys.executable, str(example)], capture_output=True, text=True, check=True, timeout=600)
+    lines = done.stdout.splitlines()
+    assert any(line.endswith("3 -> 7: 7 bytes") for line in lines)
+    assert any("7 -> 3: " in line for line in lines)
+    assert any(line.endswith("chose a side with the neighbours' features") for line in lines)
+    assert lines[-1].startswith("both arrived after ")
+    assert lines[-1].endswith("faults: {3: {}, 7: {}}")
