@@ -59,16 +59,14 @@ def test_it_does_what_the_simulators_robots_do(name):
     starts = [(-3.0, 0.0, 0.0), (-3.0, 0.9, 0.2), (3.0, 0.2, 3.0), (0.0, -3.0, 1.5)]
     goals = [(3.0, 0.3), (3.0, -0.5), (-3.0, 0.0), (0.0, 3.0)]
     world = world_of(Circle(center=(0.0, 0.0), radius=0.5), Circle(center=(-1.2, 0.6), radius=0.2))
-    sim, shared, scratch = place_sim(starts, goals, world)
-    memory, rig = planner.new_memory(4), rig_of()
+    sim, swarm = place_sim(starts, goals, world)
+    memory = planner.new_memory(4)
     robots = [new_robot(name, address=i) for i in range(4)]
     index_robots(sim)
     packets = 0
     for tick in range(60):
         sense(sim, tick, 0, 4)
-        planner.step_all(
-            0, 4, sim.ranges, sim.percepts, shared, memory, sim.decisions, scratch, rig, planner.Params()
-        )
+        planner.step_all(0, 4, swarm, memory, planner.params())
         for i, robot in enumerate(robots):
             p, d = sim.percepts[i], sim.decisions[i]
             command = robot.tick(
