@@ -52,9 +52,9 @@ class ForestOptions:
 
     size_m: float = 20.0  # side of the square; a disc has the same area
     density: float = 0.35  # trees per m^2
-    radius_min: float = 0.15  # [m]
-    radius_max: float = 0.35  # [m]
-    obstacles: Literal["trees", "rocks"] = "trees"
+    radius_min: float = 0.15  # of the smallest tree [m]
+    radius_max: float = 0.35  # of the largest tree [m]
+    obstacles: Literal["trees", "rocks"] = "trees"  # rocks are convex polygons of the same areas
 
 
 @dataclass(frozen=True)

@@ -36,9 +36,9 @@ class MapOptions:
     """Sizes; the defaults are those of the document."""
 
     obstacles: Kind = "C"  # A rectangles, B cylinders, C both
-    size_m: float = SIZE_M
-    fewest: float = FEWEST
-    most: float = MOST
+    size_m: float = SIZE_M  # side of the map
+    fewest: float = FEWEST  # obstacles on it, at least
+    most: float = MOST  # and at most
     apart_m: float = 7.0  # from a start to its goal, at least (task I)
 
 

@@ -20,7 +20,7 @@ class CorridorOptions:
     """Sizes [m]."""
 
     width_m: float = 1.5  # of the corridor; wider for robots that could not pass in it
-    length_m: float = 8.0
+    length_m: float = 8.0  # of the corridor
     room_m: float = 4.0  # width of the rooms at both ends
     gap_m: float = 1.2  # from the corridor to the first robots
 

@@ -36,8 +36,8 @@ class LabOptions:
     obstacles: Kind = "C"  # A rectangles, B cylinders, C both
     width_m: float = 8.0  # wider for more robots than fit side by side
     length_m: float = 10.0  # the way is 2 (EDGE_M + radius) shorter
-    fewest: float = 6.0
-    most: float = 12.0
+    fewest: float = 6.0  # obstacles on it, at least
+    most: float = 12.0  # and at most
 
 
 def make(seed: int, robots: int = 5, radius: float = 0.15, **options: Option) -> Setup:
