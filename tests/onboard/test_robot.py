@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from helpers import DT, place_sim, rig_of, scan_at, world_of
-from onboard.robots import (
+from robots import (
     ANGLES,
     OPEN,
     Driver,

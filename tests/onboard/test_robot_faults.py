@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from helpers import DT
-from onboard.robots import ANGLES, OPEN, Driver, LaserScan, brakes, new_robot, wall_ahead, within
+from robots import ANGLES, OPEN, Driver, LaserScan, brakes, new_robot, wall_ahead, within
 from swarmscope.errors import ConfigError, MissingExtraError, UnknownNameError
 from swarmscope.onboard.body import Body
 from swarmscope.onboard.lidar import Lidar

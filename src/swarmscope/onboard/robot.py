@@ -6,18 +6,24 @@ reason. ``tick`` never raises, never compiles and never waits. Every field, unit
 
 from __future__ import annotations
 
-import inspect
 import math
-import time
 from collections import Counter
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from swarmscope.errors import ConfigError, UnknownNameError
-from swarmscope.onboard.body import Body, protection_model
+from swarmscope.onboard.body import Body
+from swarmscope.onboard.data_sheets import (
+    DEFAULTS,
+    check_address,
+    check_body,
+    check_rate,
+    options_of,
+    params_of,
+    planner_of,
+    rig_of,
+)
 from swarmscope.onboard.edge import (
-    ADDRESSES,
     GOAL_M,
     Mail,
     Seen,
@@ -27,15 +33,13 @@ from swarmscope.onboard.edge import (
     nearest_neighbours,
     numbers,
     one_number,
-    short,
 )
-from swarmscope.onboard.lidar import Lidar, check_lidar, finite, sensor_of
-from swarmscope.onboard.percept import Rig, make_rig
-from swarmscope.onboard.perception.reproject import reproject, settle
-from swarmscope.onboard.planning._contract import REASON_NAMES, STATE_NAMES, load_planner, make_params
-from swarmscope.onboard.rows import Rows, kernels_of
+from swarmscope.onboard.lidar import Lidar, check_lidar
+from swarmscope.onboard.planning._contract import REASON_NAMES, STATE_NAMES
+from swarmscope.onboard.rows import Rows
 from swarmscope.onboard.scans import STALE_PERIODS, Scans
 from swarmscope.onboard.trail import Pose, Trail, then
+from swarmscope.onboard.warm import WarmUp, warm_up
 
 __all__ = ["Command", "Lidar", "Robot", "Seen", "WarmUp"]
 
@@ -69,16 +73,6 @@ class Command(NamedTuple):
     """False when the robot brakes because an input could not be used."""
 
 
-class WarmUp(NamedTuple):
-    """What ``Robot.warm_up`` did."""
-
-    seconds: float
-    compiled: tuple[str, ...]
-    """Kernels that were compiled; they are on disk now, and the next start loads them."""
-    loaded: tuple[str, ...]
-    """Kernels that were there, on disk or in this process."""
-
-
 class Robot:
     """A planner at work on a robot with ``body`` and ``lidar`` and the radio ``address`` (0 to 65535).
 
@@ -99,13 +93,11 @@ class Robot:
         model: Path | str | None = None,
         **options: float,
     ) -> None:
-        self._planner = _planner(planner, model)
-        self.body, self.lidar = _check_body(body), check_lidar(lidar)
-        self.address, self.rate_hz = _check_address(address), finite(rate_hz, "rate_hz")
-        if not 0.0 < self.rate_hz <= 1000.0:
-            raise ConfigError("rate_hz", f"must be above 0 and at most 1000 Hz, not {rate_hz!r}")
-        self.params = _params(self._planner, params or {})
-        self._options = _options(options)
+        self._planner = planner_of(planner, model)
+        self.body, self.lidar = check_body(body), check_lidar(lidar)
+        self.address, self.rate_hz = check_address(address), check_rate(rate_hz)
+        self.params = params_of(self._planner, params or {})
+        self._options = options_of(options)
         self._period_s = 1.0 / self.rate_hz
         self.faults: Counter[str] = Counter()
         """How often what could not be used."""
@@ -126,17 +118,7 @@ class Robot:
 
     def warm_up(self, say: Callable[[str], None] | None = None) -> WarmUp:
         """Compile or load the kernels and networks that ``tick`` needs; ``say`` is told what it did."""
-        begun = time.perf_counter()
-        kernels = (*kernels_of(self._planner), settle, reproject)
-        before = [_compiled(kernel) for kernel in kernels]
-        _rehearse(*self._set_up())
-        names = [getattr(kernel, "__name__", str(kernel)) for kernel in kernels]
-        new = [_compiled(kernel) > count for kernel, count in zip(kernels, before, strict=True)]
-        done = WarmUp(
-            seconds=time.perf_counter() - begun,
-            compiled=tuple(name for name, fresh in zip(names, new, strict=True) if fresh),
-            loaded=tuple(name for name, fresh in zip(names, new, strict=True) if not fresh),
-        )
+        done = warm_up(self._planner, *self._set_up())
         self._warm = True
         if say is not None:
             what = f"compiled {', '.join(done.compiled)}" if done.compiled else "all kernels were compiled already"
@@ -185,9 +167,9 @@ class Robot:
 
     def _set_up(self) -> tuple[Scans, Rows]:
         """Return fresh scans and rows."""
-        clearance = float(self._options.get("clearance", _DEFAULTS["clearance"]))
+        clearance = float(self._options.get("clearance", DEFAULTS["clearance"]))
         scans = Scans(self.lidar, self._period_s, self.body.radius_m + clearance)
-        rig = _rig(self.body, self.lidar, scans, self._options)
+        rig = rig_of(self.body, self.lidar, scans, self._options)
         return scans, Rows(self._planner, rig, self.params, self.address)
 
     def _take_time_and_motion(self, now_s: Any, moved: Any) -> None:
@@ -267,101 +249,9 @@ class Robot:
         return Command(v=0.0, w=0.0, outbox=[], reason=f"brakes: {why}", state=BRAKES, side="", ok=False)
 
 
-_DEFAULTS = {n: p.default for n, p in inspect.signature(make_rig).parameters.items() if p.kind is p.KEYWORD_ONLY}
-
-
-def _planner(name: str, model: Path | str | None) -> Any:
-    """Return the planner ``name``; raises an error when no robot can run it."""
-    planner = load_planner(name) if isinstance(name, str) else None
-    if planner is None:
-        raise ConfigError("planner", f"must be the name of a planner, not {short(name)}")
-    if getattr(planner, "TOLD_SIDE", False):
-        raise ConfigError("planner", f"'{name}' is told the right side by somebody who knows the map: not on a robot")
-    chosen: Any = planner
-    if model is not None:
-        if not hasattr(planner, "with_model"):
-            raise ConfigError("model", f"planner '{name}' has no network")
-        chosen = planner.with_model(model)
-    check = getattr(chosen, "check_available", None)
-    if check is not None:
-        check()
-    return chosen
-
-
-def _params(planner: Any, values: Mapping[str, float]) -> Any:
-    return make_params(planner, {name: finite(value, f"params.{name}") for name, value in values.items()})
-
-
-def _options(given: Mapping[str, float]) -> dict[str, Any]:
-    """Return the options of ``make_rig`` as plain numbers; raises ConfigError or UnknownNameError."""
-    checked: dict[str, Any] = {}
-    for name, value in given.items():
-        if name not in _DEFAULTS:
-            raise UnknownNameError("option", name, _DEFAULTS, "Robot")
-        if isinstance(_DEFAULTS[name], bool):
-            checked[name] = bool(value)
-            continue
-        checked[name] = finite(value, name)
-        if checked[name] < 0.0:
-            raise ConfigError(name, f"must be at least 0, not {value!r}")
-    return checked
-
-
-def _check_body(body: Body) -> Body:
-    checked = Body(*(finite(value, f"body.{name}") for name, value in zip(Body._fields, body, strict=True)))
-    try:
-        protection = protection_model(checked)
-    except ConfigError as error:
-        raise ConfigError(error.where.replace("robot.", "body."), error.why) from None
-    if not all(map(math.isfinite, protection)):
-        raise ConfigError("body", "its protection model is not finite")
-    return checked
-
-
-def _check_address(address: Any) -> int:
-    value = finite(address, "address")
-    if value != int(value) or not 0 <= value < ADDRESSES:
-        raise ConfigError("address", f"must be a whole number from 0 to {ADDRESSES - 1}, not {address!r}")
-    return int(value)
-
-
-def _rig(body: Body, lidar: Lidar, scans: Scans, options: Mapping[str, Any]) -> Rig:
-    """Return the robot's constants; raises ConfigError when LiDAR and body do not go together."""
-    offset = math.hypot(lidar.mount[0], lidar.mount[1])
-    if offset > body.radius_m:
-        raise ConfigError("lidar.mount", f"{offset:g} m from the centre is outside the radius {body.radius_m:g} m")
-    reach = protection_model(body).r + offset
-    if lidar.range_m < reach:
-        raise ConfigError("lidar.range_m", f"{lidar.range_m:g} m is less than this body needs to stop, {reach:.2f} m")
-    every = {name: value if isinstance(value, bool) else float(value) for name, value in _DEFAULTS.items()}
-    return make_rig(body, sensor_of(lidar, scans.grid), **(every | dict(options)))
-
-
 def _place(error: Exception) -> str:
     """Return where an error comes from."""
     trace = error.__traceback__
     while trace is not None and trace.tb_next is not None:
         trace = trace.tb_next
     return "?" if trace is None else f"{Path(trace.tb_frame.f_code.co_filename).name}:{trace.tb_lineno}"
-
-
-def _compiled(kernel: Any) -> int:
-    """Return how many versions of a kernel were compiled, not loaded, in this process."""
-    misses = getattr(getattr(kernel, "stats", None), "cache_misses", None)
-    return sum(misses.values()) if misses else 0
-
-
-def _rehearse(scans: Scans, rows: Rows) -> None:
-    """Let a robot that nobody will drive live through a few ticks of every kind."""
-    trail = Trail(1e9, 1.0)
-    rows.load()
-    for k in range(4):
-        now = float(k)
-        trail.add(now, (0.01 * k, 0.0, 0.01))
-        if k == 0:
-            scans.rehearse(now)
-        scans.write(trail, 0.0, rows.scan)
-        rows.scan[: rows.scan.size // 2 if k == 2 else 0] = 1.0
-        rows.fill(now_s=now, dt_s=0.2, goal_distance=5.0, goal_bearing=0.1 * k)
-        rows.see([Seen(1, 1.0, 0.5)] if k > 1 else [])
-        rows.step()
