@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from helpers import DT
-from onboard.robots import ANGLES, OPEN, Driver, LaserScan, brakes, new_robot, wall_ahead, within
+from robots import ANGLES, OPEN, Driver, LaserScan, brakes, new_robot, wall_ahead, within
 from swarmscope.errors import ConfigError, MissingExtraError, UnknownNameError
 from swarmscope.onboard.body import Body
 from swarmscope.onboard.lidar import Lidar
@@ -375,7 +375,8 @@ WRONG_ROBOTS = [
     ({"address": 65536}, "address"), ({"address": 1.5}, "address"), ({"address": None}, "address"),
     ({"address": NAN}, "address"), ({"rate_hz": 0.0}, "rate_hz"),
     ({"rate_hz": NAN}, "rate_hz"), ({"rate_hz": -5}, "rate_hz"), ({"look_ahead_m": NAN}, "look_ahead_m"),
-    ({"clearance_m": -0.1}, "clearance_m"), ({"margin_m": "wide"}, "margin_m"), ({"params": {"w_i": NAN}}, "planner 'nav-scope': w_i"),
+    ({"clearance_m": -0.1}, "clearance_m"), ({"margin_m": "wide"}, "margin_m"),
+    ({"params": {"w_i": NAN}}, "planner 'nav-scope': w_i"),
     ({"planner": "oracle"}, "planner"), ({"planner": None}, "planner"), ({"planner": 7}, "planner"),
 ]  # fmt: skip
 
