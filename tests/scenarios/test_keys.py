@@ -51,7 +51,7 @@ def test_a_complete_scenario_holds_the_keys_that_are_listed():
         value = written[group]
         for part in rest:
             value = value[part]
-        if key.default != MUST and key.default != {}:
+        if key.default not in (MUST, {}):
             assert value == key.default, key.name
 
 
