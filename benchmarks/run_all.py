@@ -10,6 +10,7 @@ from pathlib import Path
 HERE = Path(__file__).parent
 SCRIPTS = (
     "bench_step.py",
+    "bench_robot.py",
     "bench_giwt.py",
     "bench_world.py",
     "bench_lidar.py",

@@ -12,7 +12,6 @@ torch = pytest.importorskip("torch")
 pytest.importorskip("torch_geometric")
 
 from safetensors.torch import save  # noqa: E402
-from swarmscope.onboard.planning._giwt import draw  # noqa: E402
 
 from swarmscope.errors import ConfigError, InputFileError, SwarmscopeError  # noqa: E402
 from swarmscope.learning import checkpoints, export, models, train  # noqa: E402
@@ -31,6 +30,7 @@ from swarmscope.learning.evaluate import (  # noqa: E402
 from swarmscope.learning.generate import generate  # noqa: E402
 from swarmscope.learning.records import load, read_manifest, select, split_of, to_bytes, write_manifest  # noqa: E402
 from swarmscope.learning.scenes import robot  # noqa: E402
+from swarmscope.onboard.network.answering import draw  # noqa: E402
 from swarmscope.onboard.network.local_map import CELL_DISTANCE  # noqa: E402
 
 SMALL = {"sets": ["A-II-driven"], "channels": [4, 8, 8], "batch": 32, "threads": 2, "precision": "float32"}

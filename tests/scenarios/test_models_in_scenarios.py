@@ -10,7 +10,8 @@ import yaml
 from giwt_models import make_model, write_card
 from swarmscope.errors import ConfigError, InputFileError
 from swarmscope.experiments.work import finished, make_job, unit_key, work, world_key
-from swarmscope.onboard.planning import giwt
+from swarmscope.onboard.planners import load_planner
+from swarmscope.scenarios import to_kernels
 from swarmscope.scenarios.places import make_setup
 from swarmscope.scenarios.read import load_scenario, parse_scenario
 from swarmscope.scenarios.to_kernels import complete, make_setting, planner_of
@@ -38,8 +39,8 @@ def test_a_model_is_looked_for_beside_the_scenario_and_then_as_it_is(tmp_path, m
     assert here["planner"]["model"] == str(tmp_path / "a/model")
     assert complete(parse_scenario(here, "again")) == here
     setting = make_setting(scenario, make_setup(scenario))
-    assert (setting.planner.NAME, str(setting.planner.folder)) == ("giwt", str(tmp_path / "a/model"))
-    assert planner_of(scenario.planner) is not giwt
+    assert (setting.planner.name, str(setting.planner.model.folder)) == ("giwt", str(tmp_path / "a/model"))
+    assert planner_of(scenario.planner) != load_planner("giwt")
 
 
 def test_planners_without_a_network_refuse_a_model(tmp_path):
@@ -63,8 +64,8 @@ def test_the_key_of_a_shipped_model_is_that_of_its_card(tmp_path, monkeypatch):
     scenario = parse_scenario({**T1, "planner": {"name": "giwt"}}, "test")
     keys = []
     for seed in range(2):
-        planner = giwt.with_model(make_model(tmp_path / "shipped", seed))
-        monkeypatch.setattr(giwt, "model_state", planner.model_state)
+        shipped = load_planner("giwt").with_model(make_model(tmp_path / "shipped", seed))
+        monkeypatch.setattr(to_kernels, "load_planner", {"giwt": shipped}.get)
         keys.append(unit_key(scenario))
     assert keys[0] != keys[1]
 

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmscope.errors import ConfigError, InputFileError, SwarmscopeError, UnknownNameError
-from swarmscope.onboard.planning.dh_bug import toss
+from swarmscope.onboard.deciding.bug import toss
 from swarmscope.scenarios.places import make_setup, map_path
 from swarmscope.scenarios.read import load_scenario, parse_scenario
 from swarmscope.scenarios.scenario import Scenario
@@ -180,7 +180,7 @@ def test_settings_reach_the_kernels_in_their_units():
     assert (setting.dt, setting.limit_s, setting.seed, setting.threads) == (0.1, 12.0, 9, 2)
     rig = make_rig_of(scenario)
     assert (rig.sensor.beams, rig.sensor.range_max, rig.sensor.wraps) == (90, 8.0, False)
-    assert (rig.body.radius_m, rig.body.v_max_mps, rig.clearance) == (0.2, 0.4, 0.05)
+    assert (rig.body.radius_m, rig.body.v_max_mps, rig.guarding.clearance_m) == (0.2, 0.4, 0.05)
 
 
 @pytest.mark.parametrize(("robots", "choice", "kept"), [(2, "auto", True), (2000, "auto", False), (2, "no", False)])

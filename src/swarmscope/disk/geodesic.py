@@ -137,18 +137,36 @@ def _by_last_tangent(ways: Ways, field: int, slot: int, angle: float, clear: flo
 @jit_inner
 def _along_slot(ways: Ways, field: int, slot: int, angle: float) -> float:
     """Return the cost to the goal for who arrives on ``slot`` at ``angle``, infinity if there is no way on."""
-    which = ways.field_map[field]
-    rho = ways.disc[slot // 2, 2]
+    return _from_slot(ways, field, slot, angle, -1)
+
+
+@jit_inner
+def _from_slot(ways: Ways, field: int, slot: int, angle: float, node: int) -> float:
+    """Return the cost of going on along ``slot`` from ``angle``, past ``node`` if it is not -1."""
     clear = _clear_run(ways, slot, angle) + 1e-9
-    least, _ = _by_last_tangent(ways, field, slot, angle, clear)
-    first, end = ways.slot_start[slot], ways.slot_start[slot + 1]
-    if end > first:
-        node = _next_node(ways, slot, angle)
-        turn = _turn(slot, angle, ways.node_angle[node])
-        if turn <= clear:
-            offset = ways.field_node[field] - ways.slot_start[2 * ways.disc_start[which]]
-            least = min(least, turn * rho + ways.cost[offset + node])
-    return least
+    last, _ = _by_last_tangent(ways, field, slot, angle, clear)
+    follow, _, _ = _by_next_node(ways, field, slot, angle, node, clear)
+    return min(last, follow)
+
+
+@jit_inner
+def _by_next_node(ways: Ways, field: int, slot: int, angle: float, node: int, clear: float) -> tuple[float, float, int]:
+    """Return the cost for who goes along ``slot`` until its next node, how far that is [rad], and that node.
+
+    The next after ``node``, of which ``angle`` is the place, or after the angle where ``node`` is -1. ``clear`` is
+    how far one can go [rad]. Cost infinity if there is no other node or one cannot go that far.
+    """
+    begin, end = ways.slot_start[slot], ways.slot_start[slot + 1]
+    if end - begin < (1 if node < 0 else 2):
+        return math.inf, 0.0, -1
+    following = node + 1 if node + 1 < end else begin
+    if node < 0:
+        following = _next_node(ways, slot, angle)
+    turn = _turn(slot, angle, ways.node_angle[following])
+    if turn > clear:
+        return math.inf, turn, following
+    offset = ways.field_node[field] - ways.slot_start[2 * ways.disc_start[ways.field_map[field]]]
+    return turn * ways.disc[slot // 2, 2] + ways.cost[offset + following], turn, following
 
 
 @jit_inner
@@ -425,27 +443,10 @@ def _fill(ways: Ways, field: int) -> None:
             first, end = ways.slot_start[slot], ways.slot_start[slot + 1]
             for k in range(end - 1, first - 1, -1):
                 cost = ways.node_length[k] + _along_slot(ways, field, ways.node_to[k], ways.node_to_angle[k])
-                cost = min(cost, _further(ways, field, slot, k))
+                cost = min(cost, _from_slot(ways, field, slot, ways.node_angle[k], k))
                 if cost < ways.cost[offset + k] - 1e-12:
                     ways.cost[offset + k] = cost
                     better = True
-
-
-@jit_inner
-def _further(ways: Ways, field: int, slot: int, node: int) -> float:
-    """Return the cost from a node when one stays on its slot, past this node."""
-    which = ways.field_map[field]
-    rho, angle = ways.disc[slot // 2, 2], ways.node_angle[node]
-    clear = _clear_run(ways, slot, angle) + 1e-9
-    least, _ = _by_last_tangent(ways, field, slot, angle, clear)
-    first, end = ways.slot_start[slot], ways.slot_start[slot + 1]
-    if end - first > 1:
-        following = node + 1 if node + 1 < end else first
-        turn = _turn(slot, angle, ways.node_angle[following])
-        if turn <= clear:
-            offset = ways.field_node[field] - ways.slot_start[2 * ways.disc_start[which]]
-            least = min(least, turn * rho + ways.cost[offset + following])
-    return least
 
 
 @jit_inner

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarmscope._jit import jit_alloc as jit
+from swarmscope._jit import jit_inner
 from swarmscope.judging.shortest_path import RESOLUTION_M, SNAP_CELLS
 from swarmscope.onboard.rig import Rig
 from swarmscope.scenarios.scenario import Scenario
@@ -30,9 +31,7 @@ def judged_by(scenario: Scenario, rig: Rig) -> tuple[float, float]:
     return scenario.robot.radius_m + scenario.safety.margin_m, horizon_m
 
 
-def make_advice(
-    setup: Setup, radius: float, horizon_m: float = math.inf, resolution: float = RESOLUTION_M
-) -> Advice:
+def make_advice(setup: Setup, radius: float, horizon_m: float = math.inf, resolution: float = RESOLUTION_M) -> Advice:
     """Return the cost to go of every robot's goal, on a grid like that of the reference ways.
 
     ``radius`` [m] is what the ways keep off obstacles: a planner's own margin included, so that what blocks it
@@ -81,33 +80,46 @@ def cost_to_go(
         bucket = level % 3
         for k in range(counts[bucket]):
             here = waiting[bucket, k]
-            reached = cost[here]
-            if reached < level:
+            if cost[here] < level:
                 continue  # was reached by a shorter way since
             if max(counts) + 8 > waiting.shape[1]:
                 longer = np.empty((3, 2 * waiting.shape[1]), dtype=np.int32)
                 longer[:, : waiting.shape[1]] = waiting
                 waiting = longer
-            straight, aslant = np.float32(reached + 1.0), np.float32(reached + SQRT2)
-            into, into_aslant = int(straight) % 3, int(aslant) % 3
-            for across in (-1, 1):
-                if free[here + across] and straight < cost[here + across]:
-                    cost[here + across] = straight
-                    waiting[into, counts[into]] = here + across
-                    counts[into] += 1
-            for up in (-wide, wide):
-                if not free[here + up]:
-                    continue
-                if straight < cost[here + up]:
-                    cost[here + up] = straight
-                    waiting[into, counts[into]] = here + up
-                    counts[into] += 1
-                for across in (-1, 1):
-                    there = here + up + across
-                    if free[there] and free[here + across] and aslant < cost[there]:
-                        cost[there] = aslant
-                        waiting[into_aslant, counts[into_aslant]] = there
-                        counts[into_aslant] += 1
+            _spread(here, wide, free, cost, waiting, counts)
         counts[bucket] = 0
         level += 1
     return cost.reshape((height + 2, wide))[1:-1, 1:-1].copy()
+
+
+@jit_inner
+def _spread(
+    here: int,
+    wide: int,
+    free: NDArray[np.bool_],
+    cost: NDArray[np.float32],
+    waiting: NDArray[np.int32],
+    counts: NDArray[np.int64],
+) -> None:
+    """Note the cost of all neighbours of a cell that are reached by a shorter way through it; rows are ``wide``."""
+    reached = cost[here]
+    straight, aslant = np.float32(reached + 1.0), np.float32(reached + SQRT2)
+    into, into_aslant = int(straight) % 3, int(aslant) % 3
+    for across in (-1, 1):
+        if free[here + across] and straight < cost[here + across]:
+            cost[here + across] = straight
+            waiting[into, counts[into]] = here + across
+            counts[into] += 1
+    for up in (-wide, wide):
+        if not free[here + up]:
+            continue
+        if straight < cost[here + up]:
+            cost[here + up] = straight
+            waiting[into, counts[into]] = here + up
+            counts[into] += 1
+        for across in (-1, 1):
+            there = here + up + across
+            if free[there] and free[here + across] and aslant < cost[there]:
+                cost[there] = aslant
+                waiting[into_aslant, counts[into_aslant]] = there
+                counts[into_aslant] += 1

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarmscope._jit import jit_alloc as jit
+from swarmscope._jit import jit_inner
 from swarmscope.tasks._occupancy import Raster
 
 SQRT2 = math.sqrt(2.0)
@@ -91,7 +92,7 @@ def _search(
     blocked: Bytes, row: int, column: int, goal_row: int, goal_column: int,
     cost: Floats, parent: Shorts, stamp: Shorts, key: Floats, cell: Shorts, number: int,
 ) -> Ints:  # fmt: skip
-    height, width = blocked.shape
+    width = blocked.shape[1]
     if blocked[row, column] == 1 or blocked[goal_row, goal_column] == 1:
         return np.zeros(0, dtype=np.int64)
     start, goal = row * width + column, goal_row * width + goal_column
@@ -111,14 +112,10 @@ def _search(
         row, column = here // width, here % width
         for dr in range(-1, 2):
             for dc in range(-1, 2):
-                r, c = row + dr, column + dc
-                if (dr == 0 and dc == 0) or r < 0 or c < 0 or r >= height or c >= width or blocked[r, c] == 1:
+                step = _step(blocked, row, column, dr, dc)
+                if step == 0.0:
                     continue
-                step = 1.0
-                if dr != 0 and dc != 0:
-                    if blocked[row, c] == 1 or blocked[r, column] == 1:
-                        continue
-                    step = SQRT2
+                r, c = row + dr, column + dc
                 there = r * width + c
                 if stamp[there] == -number:
                     continue
@@ -129,14 +126,38 @@ def _search(
                 dy, dx = abs(goal_row - r), abs(goal_column - c)
                 ahead = max(dx, dy) + (SQRT2 - 1.0) * min(dx, dy)
                 if count == key.shape[0]:  # the same cell may wait several times
-                    longer_key, longer_cell = np.empty(2 * count), np.empty(2 * count, dtype=np.int32)
-                    longer_key[:count], longer_cell[:count] = key, cell
-                    key, cell = longer_key, longer_cell
+                    key, cell = _twice_as_long(key, cell)
                 key[count], cell[count] = through + ahead, there
                 sift_up(key, cell, count)
                 count += 1
     if abs(stamp[goal]) != number:
         return np.zeros(0, dtype=np.int64)
+    return _way_back(parent, start, goal)
+
+
+@jit_inner
+def _step(blocked: Bytes, row: int, column: int, dr: int, dc: int) -> float:
+    """Return the length [cells] of the step by (dr, dc) from a cell, 0 if it is none or not free."""
+    r, c = row + dr, column + dc
+    if r < 0 or c < 0 or r >= blocked.shape[0] or c >= blocked.shape[1] or blocked[r, c] == 1:
+        return 0.0
+    if dr == 0 or dc == 0:
+        return 0.0 if dr == dc else 1.0
+    return 0.0 if blocked[row, c] == 1 or blocked[r, column] == 1 else SQRT2
+
+
+@jit
+def _twice_as_long(key: Floats, cell: Shorts) -> tuple[Floats, Shorts]:
+    """Return the two arrays of a heap with room for as many entries again."""
+    count = key.shape[0]
+    longer_key, longer_cell = np.empty(2 * count), np.empty(2 * count, dtype=np.int32)
+    longer_key[:count], longer_cell[:count] = key, cell
+    return longer_key, longer_cell
+
+
+@jit
+def _way_back(parent: Shorts, start: int, goal: int) -> Ints:
+    """Return the cells from start to goal, of which each knows the one before it."""
     length = 1
     here = goal
     while here != start:

@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmscope._jit import jit
+from swarmscope._jit import jit, jit_inner
 from swarmscope.disk import geodesic
 from swarmscope.disk.contact import nearest_on_the_way
-from swarmscope.disk.geodesic import Ways, _along_slot, _by_last_tangent, _clear_run, _next_node, _turn, look_up
+from swarmscope.disk.geodesic import Ways, _along_slot, _by_last_tangent, _by_next_node, _clear_run, look_up
 from swarmscope.disk.rules import ROUNDING, Floats
 
 VERTICES = 4000
@@ -164,53 +164,55 @@ def trace(ways: Ways, field: int, x: float, y: float, spacing: float, out: Float
         return -1
     out[first, 0], out[first, 1] = x, y
     count = first + 1
-    gx, gy = ways.field_goal[field, 0], ways.field_goal[field, 1]
-    which = ways.field_map[field]
-    first_slot = 2 * ways.disc_start[which]
-    offset = ways.field_node[field] - ways.slot_start[first_slot]
     if slot >= 0:
         c = slot // 2
         px, py = ways.disc[c, 0] - x, ways.disc[c, 1] - y
         ahead = max(0.0, px * dx + py * dy)
         angle = math.atan2(y + dy * ahead - ways.disc[c, 1], x + dx * ahead - ways.disc[c, 0])
-        node = -1
-        while True:
-            rho = ways.disc[slot // 2, 2]
-            if node >= 0:
-                leave = ways.node_length[node] + _along_slot(ways, field, ways.node_to[node], ways.node_to_angle[node])
-                if leave <= ways.cost[offset + node] + 1e-10:
-                    slot, angle, node = ways.node_to[node], ways.node_to_angle[node], -1
-                    continue
-            clear = _clear_run(ways, slot, angle) + 1e-9
-            last, turn_last = _by_last_tangent(ways, field, slot, angle, clear)
-            begin, end = ways.slot_start[slot], ways.slot_start[slot + 1]
-            follow, turn_node, following = math.inf, 0.0, -1
-            if end > begin:
-                if node < 0:
-                    following = _next_node(ways, slot, angle)
-                elif end - begin > 1:
-                    following = node + 1 if node + 1 < end else begin
-                if following >= 0:
-                    turn_node = _turn(slot, angle, ways.node_angle[following])
-                    if turn_node <= clear:
-                        follow = turn_node * rho + ways.cost[offset + following]
-            if not min(last, follow) < math.inf:
-                return -1
-            turn = turn_last if last <= follow else turn_node
-            pieces = int(turn * rho / spacing) + 1
-            if count + pieces + 2 > len(out):
-                return -1
-            sense = 1.0 if slot % 2 == 0 else -1.0
-            for k in range(pieces + 1):
-                at = angle + sense * turn * k / pieces
-                out[count, 0] = ways.disc[slot // 2, 0] + rho * math.cos(at)
-                out[count, 1] = ways.disc[slot // 2, 1] + rho * math.sin(at)
-                count += 1
-            if last <= follow:
-                break
-            angle, node = ways.node_angle[following], following
-    out[count, 0], out[count, 1] = gx, gy
+        count = _trace_arcs(ways, field, slot, angle, spacing, out, count)
+        if count < 0:
+            return -1
+    out[count, 0], out[count, 1] = ways.field_goal[field, 0], ways.field_goal[field, 1]
     return count + 1
+
+
+@jit_inner
+def _trace_arcs(ways: Ways, field: int, slot: int, angle: float, spacing: float, out: Floats, count: int) -> int:
+    """Write the way from a place on a slot until where its last tangent begins, from row ``count``; as ``trace``."""
+    offset = ways.field_node[field] - ways.slot_start[2 * ways.disc_start[ways.field_map[field]]]
+    node = -1
+    while True:
+        if node >= 0:
+            leave = ways.node_length[node] + _along_slot(ways, field, ways.node_to[node], ways.node_to_angle[node])
+            if leave <= ways.cost[offset + node] + 1e-10:
+                slot, angle, node = ways.node_to[node], ways.node_to_angle[node], -1
+                continue
+        clear = _clear_run(ways, slot, angle) + 1e-9
+        last, turn_last = _by_last_tangent(ways, field, slot, angle, clear)
+        follow, turn_node, following = _by_next_node(ways, field, slot, angle, node, clear)
+        if not min(last, follow) < math.inf:
+            return -1
+        count = _trace_arc(ways, slot, angle, turn_last if last <= follow else turn_node, spacing, out, count)
+        if count < 0 or last <= follow:
+            return count
+        angle, node = ways.node_angle[following], following
+
+
+@jit_inner
+def _trace_arc(ways: Ways, slot: int, angle: float, turn: float, spacing: float, out: Floats, count: int) -> int:
+    """Write an arc of ``turn`` [rad] from row ``count``; return the number of rows in use, -1 if there is no room."""
+    c = slot // 2
+    rho = ways.disc[c, 2]
+    pieces = int(turn * rho / spacing) + 1
+    if count + pieces + 2 > len(out):
+        return -1
+    sense = 1.0 if slot % 2 == 0 else -1.0
+    for k in range(pieces + 1):
+        at = angle + sense * turn * k / pieces
+        out[count, 0] = ways.disc[c, 0] + rho * math.cos(at)
+        out[count, 1] = ways.disc[c, 1] + rho * math.sin(at)
+        count += 1
+    return count
 
 
 @jit

@@ -262,25 +262,12 @@ def search(case: Case, plan: Plan, work: Work, order: Ints, iterations: int, see
 @jit
 def _improve(case: Case, plan: Plan, work: Work, cost: int) -> int:
     """Plan a late robot and some others anew; keep that if it is not worse. Return the cost."""
-    n = len(plan.last)
-    late, cap = 0, 0
-    for i in range(n):
-        late += plan.arrival[i] > case.least
+    cap = 0
+    for i in range(len(plan.arrival)):
         cap = max(cap, plan.arrival[i])
     cap = min(cap, NEVER - 1)
-    chosen = _random(work, late)
-    first = 0
-    for i in range(n):
-        if plan.arrival[i] > case.least:
-            if chosen == 0:
-                first = i
-            chosen -= 1
-    taken = _neighbours(case, plan, work, first)
-    for k in range(taken):
-        i = work.order[k]
-        work.old_last[i], work.old_arrival[i] = plan.last[i], plan.arrival[i]
-        for t in range(plan.last[i] + 1):
-            work.old_track[i, t, 0], work.old_track[i, t, 1] = plan.track[i, t, 0], plan.track[i, t, 1]
+    taken = _neighbours(case, plan, work, _some_late(case, plan, work))
+    _keep(plan, work, taken)
     # Who waits for its plan stands in the way of others for ever, or, as there is a plan to go back to, not at all.
     ghosts = _random(work, 2) == 0
     for k in range(taken):
@@ -298,12 +285,44 @@ def _improve(case: Case, plan: Plan, work: Work, cost: int) -> int:
         found = _cost(case, plan)
         if found <= cost:
             return found
+    _put_back(plan, work, taken)
+    return cost
+
+
+@jit
+def _some_late(case: Case, plan: Plan, work: Work) -> int:
+    """Return a random one of the robots that are late."""
+    late = 0
+    for i in range(len(plan.last)):
+        late += plan.arrival[i] > case.least
+    chosen = _random(work, late)
+    first = 0
+    for i in range(len(plan.last)):
+        if plan.arrival[i] > case.least:
+            if chosen == 0:
+                first = i
+            chosen -= 1
+    return first
+
+
+@jit
+def _keep(plan: Plan, work: Work, taken: int) -> None:
+    """Note the plans of the first ``taken`` robots of ``work.order``."""
+    for k in range(taken):
+        i = work.order[k]
+        work.old_last[i], work.old_arrival[i] = plan.last[i], plan.arrival[i]
+        for t in range(plan.last[i] + 1):
+            work.old_track[i, t, 0], work.old_track[i, t, 1] = plan.track[i, t, 0], plan.track[i, t, 1]
+
+
+@jit
+def _put_back(plan: Plan, work: Work, taken: int) -> None:
+    """Give the first ``taken`` robots of ``work.order`` the plans that were noted."""
     for k in range(taken):
         i = work.order[k]
         plan.last[i], plan.arrival[i] = work.old_last[i], work.old_arrival[i]
         for t in range(plan.last[i] + 1):
             plan.track[i, t, 0], plan.track[i, t, 1] = work.old_track[i, t, 0], work.old_track[i, t, 1]
-    return cost
 
 
 @jit

@@ -351,6 +351,32 @@ def _clear_until(
 
 
 @jit_inner
+def _clear_straight(
+    b: int,
+    i: int,
+    count: int,
+    x: float,
+    y: float,
+    ux: float,
+    uy: float,
+    time: float,
+    state: Floats,
+    velocity: Floats,
+    scale: Scale,
+    memory: Memory,
+) -> float:
+    """Return when one who goes with velocity u from (x, y) meets somebody; ``time`` or more if not until then."""
+    clear = 0.0
+    while clear < time:
+        h = min(scale.stride, time - clear)
+        ax, ay = x + ux * clear, y + uy * clear
+        if _conflict(b, i, count, clear, h, ax, ay, ax + ux * h, ay + uy * h, state, velocity, scale, memory):
+            break
+        clear += scale.stride
+    return clear
+
+
+@jit_inner
 def _fear(clear: float, scale: Scale) -> float:
     """Return what a conflict at that time costs."""
     return scale.fear * max(0.0, scale.horizon / (clear + 0.02 * scale.r) - 1.0)
@@ -401,13 +427,7 @@ def _decide(
             memory.cost[k] = _cost_of_going(ways, field, x, y, qx, qy, time)
             continue
         cost, memory.cost[k] = memory.cost[k], math.inf
-        clear = 0.0
-        while clear < time:
-            h = min(scale.stride, time - clear)
-            ax, ay = x + ux * clear, y + uy * clear
-            if _conflict(b, i, count, clear, h, ax, ay, ax + ux * h, ay + uy * h, state, velocity, scale, memory):
-                break
-            clear += scale.stride
+        clear = _clear_straight(b, i, count, x, y, ux, uy, time, state, velocity, scale, memory)
         if clear >= time:
             clear = _clear_until(b, i, count, qx, qy, time, ways, field, state, velocity, scale, memory)
         if clear < math.inf:

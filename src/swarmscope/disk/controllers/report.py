@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from swarmscope._jit import jit, jit_inline
+from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.disk.rules import Floats, Ints
 from swarmscope.disk.runs import Problem
 
@@ -74,6 +74,16 @@ def _velocities(
             out[b, i, 0], out[b, i, 1] = vx, vy
 
 
+@jit_inner
+def _any_ahead(x: float, y: float, to_x: float, to_y: float, things: Floats, but: int) -> bool:
+    """Return whether one of the things (k, 2 or more) other than ``but`` lies towards the goal, as seen from (x, y)."""
+    ahead = False
+    for k in range(len(things)):
+        if k != but:
+            ahead = ahead or to_x * (things[k, 0] - x) + to_y * (things[k, 1] - y) > AHEAD
+    return ahead
+
+
 @jit
 def report_velocity(
     i: int, state: Floats, goal_x: float, goal_y: float, disc: Floats, r: float, params: Params
@@ -111,16 +121,10 @@ def report_velocity(
             vx += push * px
             vy += push * py
     if at_obstacle or at_robot:
-        turns = False
-        if at_obstacle:
-            for m in range(len(disc)):
-                turns = turns or to_x * (disc[m, 0] - x) + to_y * (disc[m, 1] - y) > AHEAD
-        if at_robot:
-            for j in range(len(state)):
-                if j != i:
-                    turns = turns or to_x * (state[j, 0] - x) + to_y * (state[j, 1] - y) > AHEAD
         size = math.hypot(vx, vy)
-        if turns:
+        if (at_obstacle and _any_ahead(x, y, to_x, to_y, disc, -1)) or (
+            at_robot and _any_ahead(x, y, to_x, to_y, state, i)
+        ):
             vx, vy = -vy, vx
         elif size > 1e-6:
             vx, vy = to_x + vx / size, to_y + vy / size

@@ -1,0 +1,127 @@
+"""Scans as seen from elsewhere, against scans that are cast there."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from helpers import beams_of, circles_world, make_sensor, rig_of, scan_at
+from swarmscope.onboard.lidar import Rays
+from swarmscope.onboard.perception.reproject import Grid, Seat, reproject, settle
+from swarmscope.sim.lidar import cast_static, make_beams
+
+RIG = rig_of()
+CIRCLE = Rays(-math.pi, math.pi / 180.0, True, 5.0)
+CORE = 0.17
+
+
+def world_and_seat(seed, away=0.3):
+    rng = np.random.default_rng(seed)
+    trees = np.column_stack([rng.uniform(-4.0, 4.0, (12, 2)), rng.uniform(0.1, 0.4, 12)])
+    trees = trees[np.hypot(trees[:, 0], trees[:, 1]) - trees[:, 2] > 0.5]
+    angle, far = rng.uniform(-3.0, 3.0), rng.uniform(0.0, away)
+    x, y = far * math.cos(angle), far * math.sin(angle)
+    return circles_world(trees), Seat(x, y, rng.uniform(-3.0, 3.0), x, y, CORE)
+
+
+def moved(scan, seat, rays=CIRCLE, grid=CIRCLE, size=360):
+    out = np.empty(size, np.float32)
+    angles = grid.start + grid.increment * np.arange(size)
+    reproject(scan, rays, seat, Grid(grid, np.cos(angles), np.sin(angles)), out)
+    return out
+
+
+def points(ranges):
+    angles = -np.pi + np.pi / 180.0 * np.arange(360)
+    finite = np.isfinite(ranges)
+    return np.column_stack([ranges[finite] * np.cos(angles[finite]), ranges[finite] * np.sin(angles[finite])])
+
+
+def test_from_the_same_seat_nothing_changes():
+    for seed in range(20):
+        world, _ = world_and_seat(seed)
+        scan = scan_at(world, RIG)
+        np.testing.assert_allclose(moved(scan, Seat(0.0, 0.0, 0.0, 0.0, 0.0, CORE)), scan, rtol=1e-6)
+
+
+def test_turned_by_whole_beams_it_is_rolled():
+    world, _ = world_and_seat(3)
+    scan = scan_at(world, RIG)
+    turned = moved(scan, Seat(0.0, 0.0, math.radians(30.0), 0.0, 0.0, CORE))
+    np.testing.assert_allclose(turned, np.roll(scan, 30), rtol=1e-6)
+
+
+@given(seed=st.integers(0, 2**31))
+def test_seen_from_elsewhere_no_return_is_farther_than_it_is(seed):
+    world, seat = world_and_seat(seed)
+    out, true = moved(scan_at(world, RIG, seat.x, seat.y, seat.yaw), seat), scan_at(world, RIG)
+    assert not np.isnan(out).any()
+    near = np.where(true < 2.0, true, np.inf)  # nearer than that, readings are less than 4 cm apart
+    apart = np.linalg.norm(points(near)[:, None] - points(out)[None], axis=2).min(axis=1)
+    farther = out[np.isfinite(near)] > near[np.isfinite(near)] + 0.02
+    assert (apart[farther] < 0.2).all()  # rays that graze a tree end up to 0.2 m apart
+
+
+def test_most_of_it_is_where_it_was():
+    close = []
+    for seed in range(50):
+        world, seat = world_and_seat(seed)
+        out, true = moved(scan_at(world, RIG, seat.x, seat.y, seat.yaw), seat), scan_at(world, RIG)
+        both = np.isfinite(out) & np.isfinite(true)
+        close.append(np.abs(out[both] - true[both]) < 0.05)
+    assert np.concatenate(close).mean() > 0.8
+
+
+def test_what_lies_in_a_shadow_is_not_free():
+    world = circles_world([(1.0, 0.0, 0.2)])
+    seat = Seat(0.0, 0.3, 0.0, 0.0, 0.3, CORE)
+    out = moved(scan_at(world, RIG, 0.0, 0.3), seat)
+    behind = slice(180 - 16, 180 - 12)  # right of the tree, as seen from the origin; hidden for the sensor
+    assert np.isinf(scan_at(world, RIG)[behind]).all()
+    assert (out[behind] < 2.0).all()
+
+
+def test_a_broken_ray_becomes_a_wall_from_the_body_outwards():
+    scan = np.full(360, np.inf, np.float32)
+    scan[180] = math.nan
+    out = moved(scan, Seat(0.0, 0.0, 0.0, 0.0, 0.0, CORE))
+    assert out[180] == pytest.approx(CORE)
+    assert np.isinf(np.delete(out, 180)).all()
+    out = moved(scan, Seat(-0.3, 0.5, 0.0, -0.3, 0.5, CORE))  # passes 0.5 m to our left
+    assert out[180 + 90] == pytest.approx(0.5, abs=0.01)
+    assert out[180 + 45] == pytest.approx(0.5 * math.sqrt(2.0), abs=0.01)
+    assert np.isinf(out[90])
+
+
+def test_what_a_limited_field_does_not_cover_is_broken():
+    beams = make_beams(181, math.pi, 5.0)
+    rays = Rays(beams.angle_min, beams.increment, False, 5.0)
+    scan = np.full(181, np.inf, np.float32)
+    out = moved(scan, Seat(-0.3, 0.0, 0.0, -0.3, 0.0, CORE), rays, rays, 181)
+    assert np.isinf(out).all()
+    out = moved(scan, Seat(-0.3, 0.0, -0.5, -0.3, 0.0, CORE), rays, rays, 181)  # we have turned to the left
+    assert (np.diff(out[-26:]) < 0.0).all()
+    assert out[-1] < 0.6
+    assert np.isinf(out[:120]).all()
+
+
+def test_twice_the_beams_into_a_scan():
+    sensor = make_sensor(720)
+    world, _ = world_and_seat(5)
+    fine = np.full(720, np.inf, np.float32)
+    cast_static(world, 0.0, 0.0, 0.0, beams_of(rig_of(sensor=sensor)), fine)
+    out = moved(fine, Seat(0.0, 0.0, 0.0, 0.0, 0.0, CORE), Rays(-math.pi, math.pi / 360.0, True, 5.0))
+    assert (out <= scan_at(world, RIG) + 1e-4).all()
+    seen = np.isfinite(fine[::2])
+    assert (np.abs(out[seen] - fine[::2][seen]) < 0.2).mean() > 0.8
+
+
+def test_settle_sorts_out_what_is_no_range():
+    raw = np.array([1.0, np.inf, -np.inf, np.nan, -1.0, 0.05, 6.0, 5.0], np.float32)
+    out = np.empty(8, np.float32)
+    assert settle(raw, np.arange(8), 0.1, 5.0, out) == 4
+    assert np.array_equal(out, np.array([1.0, np.inf, np.nan, np.nan, np.nan, np.nan, np.inf, 5.0]), equal_nan=True)
