@@ -19,7 +19,7 @@ from swarmscope.errors import ConfigError, InputFileError
 from swarmscope.experiments.warm_up import kernels_are_cold
 from swarmscope.judging.references import References, reference_ways
 from swarmscope.judging.run import Contents, contents, play
-from swarmscope.judging.run_folder import WORLD, read_config, read_world, write_run
+from swarmscope.judging.run_folder import WORLD, read_config, read_user_files, read_world, write_run
 from swarmscope.scenarios.overrides import choose, leave_only, override
 from swarmscope.scenarios.plain import plain
 from swarmscope.scenarios.read import parse_scenario, read_scenario_file
@@ -141,7 +141,8 @@ def load_run(folder: Path | str) -> Run:
     """Return the run in a run folder, as ``simulate`` returned it; errors: InputFileError."""
     data = read_run(Path(folder))
     arrays = data.trajectory._asdict()
-    return Run(Contents(read_config(data.folder), read_world(data.folder), arrays, data.metrics))
+    files = read_user_files(data.folder)
+    return Run(Contents(read_config(data.folder), read_world(data.folder), arrays, data.metrics, files))
 
 
 def add_pictures(folder: Path) -> None:
@@ -198,7 +199,7 @@ def _as_read(found: Contents) -> Contents:
         plain(part, finite=finite)
         for part, finite in ((found.config, False), (found.world, True), (found.metrics, True))
     )
-    return Contents(config, world, found.trajectory, metrics)
+    return Contents(config, world, found.trajectory, metrics, found.files)
 
 
 def _setup_of(world: Mapping[str, Any]) -> Setup:

@@ -38,6 +38,11 @@ def is_file_name(name: str) -> bool:
     return name.endswith(".py")
 
 
+def short_name(name: str) -> str:
+    """Return what a member is called in titles and folders: its name, or that of its file."""
+    return Path(name).stem if is_file_name(name) else name
+
+
 def read_code(path: Path) -> bytes:
     """Return the bytes of a regular file; nothing else is opened. Errors: InputFileError."""
     try:
@@ -55,7 +60,18 @@ def read_code(path: Path) -> bytes:
 
 def compiled(path: Path, change: Callable[[ast.Module], ast.Module] | None = None) -> CodeType:
     """Return the code of a file, its syntax tree changed before. Errors: InputFileError."""
-    text = read_code(path)
+    return _compiled(path, read_code(path), change)
+
+
+def text_of(path: Path) -> str:
+    """Return the text of a user's file as it was when it was loaded, or as it is. Errors: InputFileError."""
+    place = Path(os.path.realpath(path))
+    loader = getattr(sys.modules.get(_name_of(place)), "__loader__", None)
+    text = loader.text if isinstance(loader, _Loader) else read_code(path)
+    return text.decode("utf-8", errors="replace")
+
+
+def _compiled(path: Path, text: bytes, change: Callable[[ast.Module], ast.Module] | None) -> CodeType:
     try:
         if change is None:
             return compile(text, str(path), "exec", dont_inherit=True)
@@ -72,8 +88,8 @@ def load_file(path: Path) -> ModuleType:
         raise InputFileError(path, "is not called like a Python file (.py)")
     read_code(path)
     place = Path(os.path.realpath(path))
-    package = f"{OF_A_USER}{_short_hash(str(place.parent))}"
-    name = f"{package}.{_identifier(place.stem)}"
+    name = _name_of(place)
+    package = name.partition(".")[0]
     _forget_edited(package)
     if name not in sys.modules:
         around = sys.modules.setdefault(package, ModuleType(package, f"What lies in {place.parent}."))
@@ -95,6 +111,10 @@ def _identifier(stem: str) -> str:
 
 def _short_hash(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:12]
+
+
+def _name_of(place: Path) -> str:
+    return f"{OF_A_USER}{_short_hash(str(place.parent))}.{_identifier(place.stem)}"
 
 
 def _loaded(package: str) -> set[str]:
@@ -175,13 +195,16 @@ class _Loader(importlib.machinery.SourceFileLoader):
 
     state = ""
     """Of all that the file imports, when it was loaded."""
+    text = b""
+    """Of the file, then."""
 
     def get_code(self, fullname: str) -> CodeType:
         """Return the code of the file."""
-        self.state = self.present_state()
+        self.state, self.text = self.present_state(), read_code(Path(self.path))
         package = self.name.partition(".")[0]
         beside = _Beside(package, sys.modules[package].__path__[0])
-        return compiled(Path(self.path), lambda tree: ast.fix_missing_locations(beside.visit(tree)))
+        change = lambda tree: ast.fix_missing_locations(beside.visit(tree))  # noqa: E731
+        return _compiled(Path(self.path), self.text, change)
 
     def present_state(self) -> str:
         """Return the state of all that the file imports; '' if it is gone."""

@@ -6,6 +6,13 @@ import json
 import os
 import subprocess
 import sys
+from pathlib import Path
+from string import Template
+
+import pytest
+
+from swarmscope.api import simulate
+from swarmscope.cli.new import PLANNER
 
 CODE = """
 import json, sys
@@ -57,3 +64,27 @@ def test_few_states_of_a_file_are_kept(tmp_path):
         run(tmp_path)
     states = {place.name.partition("-")[0]: list(place.iterdir()) for place in (tmp_path / "cache/kernels").iterdir()}
     assert (len(states["one"]), len(states["two"])) == (1, 4)
+
+
+def kernels_on_disk():
+    """The index files of the kernels on disk, by the folder of their module."""
+    folder = Path(os.environ["SWARMSCOPE_CACHE"]) / "kernels"
+    return {(file.relative_to(folder).parts[0], file.name, str(file)) for file in folder.rglob("*.nbi")}
+
+
+@pytest.mark.slow
+@pytest.mark.skipif("NUMBA_DISABLE_JIT" in os.environ or "NUMBA_CACHE_DIR" in os.environ, reason="needs the cache")
+def test_editing_a_planner_compiles_its_own_kernels_only(tmp_path):
+    def run(planner):
+        return simulate("swap", planner=str(planner), robots=2, progress=False, limit_s=1.0, lidar__beams=60)
+
+    for name in ("one", "two"):
+        (tmp_path / f"{name}.py").write_text(Template(PLANNER).substitute(name=name, label=name))
+        run(tmp_path / f"{name}.py")
+    before = kernels_on_disk()
+    (tmp_path / "one.py").write_text((tmp_path / "one.py").read_text().replace("] = 0.05", "] = 0.06"))
+    for name in ("one", "two"):
+        run(tmp_path / f"{name}.py")
+    new = kernels_on_disk() - before
+    assert {label.partition("-")[0] for label, _, _ in new} == {"one"}
+    assert {name.partition("-")[0] for _, name, _ in new} <= {"one.decide", "loops.step_one"}

@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
+from swarmscope.cli._code import announce, files_of, refuse_code
 from swarmscope.cli._console import PlainConsole
 from swarmscope.cli._errors import FAILED, INTERRUPTED
 from swarmscope.experiments.campaign import Keyed, State, run_missing, state_of
@@ -22,6 +23,7 @@ from swarmscope.experiments.experiment import (
     load_experiment,
     shipped_experiment,
     shipped_experiments,
+    units,
 )
 from swarmscope.experiments.store import Store
 from swarmscope.experiments.weight import estimate_weight
@@ -37,10 +39,11 @@ def reproduce_command(
     address: str | None,
     store: Path | None,
     out: Path | None,
+    code: bool = True,
 ) -> None:
     """Run a shipped experiment."""
     shipped_experiment(name)  # names the valid ones
-    run_command(name, maps, engine, workers, address, store, out, resume=False)
+    run_command(name, maps, engine, workers, address, store, out, resume=False, code=code)
 
 
 def run_command(
@@ -52,12 +55,15 @@ def run_command(
     store: Path | None,
     out: Path | None,
     resume: bool,
+    code: bool = True,
 ) -> None:
     """Run what is missing and write the report."""
     experiment = load(file)
+    files = _code_in(experiment, code)
     machine = make_engine(engine, workers, address)
     place = store_path(experiment, store)
     with Store(place, create=not resume) as results:
+        announce(files)
         try:
             with progress_bar(experiment.name) as progress:
                 state = run_missing(experiment, results, machine, maps, resume, progress, _say)
@@ -88,12 +94,13 @@ def status_command(file: str, maps: int | None, store: Path | None) -> None:
         _print_errors(state)
 
 
-def report_command(file: str, maps: int | None, store: Path | None, out: Path | None) -> None:
-    """Write the report of what is done."""
+def report_command(file: str, maps: int | None, store: Path | None, out: Path | None, code: bool = True) -> None:
+    """Write the report of what is done; users' files are not run for it."""
     experiment = load(file)
+    _code_in(experiment, code)
     place = store_path(experiment, store)
     with Store(place, create=False) as results:
-        write(experiment, results, state_of(experiment, results, maps), place, out)
+        write(experiment, results, state_of(experiment, results, maps), place, out, run_files=False)
 
 
 def export_command(file: str, csv: Path, store: Path | None) -> None:
@@ -101,6 +108,14 @@ def export_command(file: str, csv: Path, store: Path | None) -> None:
     experiment = load(file)
     with Store(store_path(experiment, store), create=False) as results:
         print(f"{csv}: {results.export(experiment.name, csv)} runs")
+
+
+def _code_in(experiment: Experiment, allowed: bool) -> list[Path]:
+    """Return the users' files that an experiment runs. Errors: ConfigError if there are some and none are allowed."""
+    files = files_of(unit.scenario for unit in units(experiment, 1))
+    if not allowed:
+        refuse_code(files)
+    return files
 
 
 def load(file: str) -> Experiment:
@@ -116,7 +131,9 @@ def store_path(experiment: Experiment, store: Path | None) -> Path:
     return store or Path("runs") / experiment.name / "results.sqlite"
 
 
-def write(experiment: Experiment, results: Store, state: State, store: Path, out: Path | None) -> None:
+def write(
+    experiment: Experiment, results: Store, state: State, store: Path, out: Path | None, run_files: bool = True
+) -> None:
     """Write the report of the runs that are done."""
     from swarmscope.viewing.report import write_report
 
@@ -125,9 +142,10 @@ def write(experiment: Experiment, results: Store, state: State, store: Path, out
         print("nothing is done yet: no report")
         return
     with Console(stderr=True).status("writing the report ...") as status:
-        weight = estimate_weight(experiment) if experiment.weight and "weight" in experiment.figures else None
+        wanted = experiment.weight and "weight" in experiment.figures and (run_files or not _code_in(experiment, True))
+        weight = estimate_weight(experiment) if wanted else None
         folder = out or store.parent / "report"
-        page = write_report(experiment, runs, folder, weight, status.update)
+        page = write_report(experiment, runs, folder, weight, status.update, run_files)
     print(page)
 
 

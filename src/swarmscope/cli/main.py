@@ -30,6 +30,10 @@ app.add_typer(disk, name="disk")
 giwt = typer.Typer(no_args_is_help=True, help="The network that picks a side: expert data, training, scores, export.")
 app.add_typer(giwt, name="giwt")
 
+new = typer.Typer(no_args_is_help=True, help="Begin a task or a planner of your own: one file, and a test for it.")
+app.add_typer(new, name="new")
+
+OwnName = Annotated[str, typer.Argument(help="A Python name; NAME.py and test_NAME.py are written here.")]
 GiwtData = Annotated[Path, typer.Option("--data", help="Folder of the expert data.")]
 GiwtSets = Annotated[
     list[str] | None, typer.Option("--set-of", help="A-I ... C-II, A-I-driven ..., placed, driven, all; repeatable.")
@@ -49,6 +53,9 @@ Workers = Annotated[int | None, typer.Option(min=1, help="Processes, else one fo
 Address = Annotated[str | None, typer.Option(help="Of a Ray cluster; 'auto' for the one this machine belongs to.")]
 StorePath = Annotated[Path | None, typer.Option(help="File with the results, else runs/<name>/results.sqlite.")]
 ReportOut = Annotated[Path | None, typer.Option(help="Folder of the report, else runs/<name>/report.")]
+
+
+NoCode = Annotated[bool, typer.Option("--no-code", help="Refuse planners and tasks in FILE.py of somebody's own.")]
 
 
 def _version(value: bool) -> None:
@@ -77,11 +84,13 @@ def run(
     scenario: Annotated[
         Path | None, typer.Argument(help="Scenario file (YAML); options override it.", show_default=False)
     ] = None,
-    task: Annotated[str | None, typer.Option(help="Task (see 'swarmscope tasks'), else T1.")] = None,
+    task: Annotated[str | None, typer.Option(help="Task (see 'swarmscope tasks') or FILE.py, else T1.")] = None,
     map_: Annotated[
         str | None, typer.Option("--map", help="map_server YAML of a building, or a packaged map by name.")
     ] = None,
-    planner: Annotated[str | None, typer.Option(help="Planner (see 'swarmscope planners'), else nav-scope.")] = None,
+    planner: Annotated[
+        str | None, typer.Option(help="Planner (see 'swarmscope planners') or FILE.py, else nav-scope.")
+    ] = None,
     robots: Annotated[int | None, typer.Option(help="Number of robots, else 15.")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of world and noise, else 0.")] = None,
     limit: Annotated[float | None, typer.Option(help="Time limit, simulated seconds, else 300.")] = None,
@@ -92,12 +101,13 @@ def run(
     out: Annotated[Path | None, typer.Option(help="Run folder, else runs/<task>-<planner>-<seed>.")] = None,
     threads: Annotated[int, typer.Option(min=1, max=256, help="Threads; the result is the same.")] = 1,
     pictures: Annotated[bool, typer.Option(help="Make paths.png and replay.html.")] = True,
+    no_code: NoCode = False,
 ) -> None:
     """Run one scenario to a folder: metrics, trajectory, world, a picture, a replay page."""
     from swarmscope.cli.run import run_command
 
     options = {"robots": robots, "seed": seed, "limit_s": limit}
-    run_command(scenario, task, map_, planner, options, set_ or [], out, threads, pictures)
+    run_command(scenario, task, map_, planner, options, set_ or [], out, threads, pictures, not no_code)
 
 
 @app.command(
@@ -147,6 +157,22 @@ def replay(
         typer.launch(page.resolve().as_uri())
 
 
+@new.command("task", epilog="Example: [bold]swarmscope new task ring[/bold]")
+def new_task(name: OwnName) -> None:
+    """Write a task of your own to begin with, and a test for it."""
+    from swarmscope.cli.new import new_command
+
+    new_command("task", name)
+
+
+@new.command("planner", epilog="Example: [bold]swarmscope new planner mine[/bold]")
+def new_planner(name: OwnName) -> None:
+    """Write a planner of your own to begin with, and a test for it."""
+    from swarmscope.cli.new import new_command
+
+    new_command("planner", name)
+
+
 @app.command(epilog="Example: [bold]swarmscope planners[/bold]")
 def planners() -> None:
     """List the planners, what each is given, and its parameters."""
@@ -178,11 +204,12 @@ def reproduce(
     address: Address = None,
     store: StorePath = None,
     out: ReportOut = None,
+    no_code: NoCode = False,
 ) -> None:
     """Run a published experiment, as far as it is not done yet, and write its report."""
     from swarmscope.cli.experiment import reproduce_command
 
-    reproduce_command(name, maps, engine, workers, address, store, out)
+    reproduce_command(name, maps, engine, workers, address, store, out, not no_code)
 
 
 @experiments.command(
@@ -199,11 +226,12 @@ def experiment_run(
     address: Address = None,
     store: StorePath = None,
     out: ReportOut = None,
+    no_code: NoCode = False,
 ) -> None:
     """Run what is not in the store yet, then write the report. May be stopped at any moment."""
     from swarmscope.cli.experiment import run_command
 
-    run_command(file, maps, engine, workers, address, store, out, resume=False)
+    run_command(file, maps, engine, workers, address, store, out, resume=False, code=not no_code)
 
 
 @experiments.command("resume", epilog="Example: [bold]swarmscope experiment resume doors.yaml[/bold]")
@@ -215,11 +243,12 @@ def experiment_resume(
     address: Address = None,
     store: StorePath = None,
     out: ReportOut = None,
+    no_code: NoCode = False,
 ) -> None:
     """Go on with a run that was stopped, and try again what failed."""
     from swarmscope.cli.experiment import run_command
 
-    run_command(file, maps, engine, workers, address, store, out, resume=True)
+    run_command(file, maps, engine, workers, address, store, out, resume=True, code=not no_code)
 
 
 @experiments.command("status", epilog="Example: [bold]swarmscope experiment status nav-scope[/bold]")
@@ -231,11 +260,13 @@ def experiment_status(file: ExperimentFile, maps: Maps = None, store: StorePath 
 
 
 @experiments.command("report", epilog="Example: [bold]swarmscope experiment report nav-scope --out report[/bold]")
-def experiment_report(file: ExperimentFile, maps: Maps = None, store: StorePath = None, out: ReportOut = None) -> None:
+def experiment_report(
+    file: ExperimentFile, maps: Maps = None, store: StorePath = None, out: ReportOut = None, no_code: NoCode = False
+) -> None:
     """Write the report of the runs that are done."""
     from swarmscope.cli.experiment import report_command
 
-    report_command(file, maps, store, out)
+    report_command(file, maps, store, out, not no_code)
 
 
 @experiments.command("export", epilog="Example: [bold]swarmscope experiment export nav-scope results.csv[/bold]")

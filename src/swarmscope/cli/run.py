@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 from swarmscope.api import add_pictures
+from swarmscope.cli._code import announce, files_of, refuse_code
 from swarmscope.cli._console import PlainConsole
 from swarmscope.errors import ConfigError
 from swarmscope.experiments.warm_up import kernels_are_cold
@@ -19,6 +20,7 @@ from swarmscope.judging.run_folder import check_out
 from swarmscope.scenarios.overrides import PLACES, choose, set_key
 from swarmscope.scenarios.read import parse_scenario, read_scenario_file
 from swarmscope.scenarios.scenario import Scenario
+from swarmscope.user_files import short_name
 from swarmscope.viewing.progress import progress_bar
 
 MOST_FAILURES = 10
@@ -52,11 +54,17 @@ def run_command(
     out: Path | None,
     threads: int,
     pictures: bool,
+    code: bool = True,
 ) -> None:
     """Run what the command line asks for and print what came out."""
     scenario = read_options(file, task, map_, planner, options, changes)
-    place = out or Path("runs") / f"{place_name(scenario)}-{scenario.planner.name}-{scenario.seed}"
+    files = files_of([scenario])
+    if not code:
+        refuse_code(files)
+    planner_name = short_name(scenario.planner.name)
+    place = out or Path("runs") / f"{place_name(scenario)}-{planner_name}-{scenario.seed}"
     check_out(place)
+    announce(files)
     if kernels_are_cold(scenario.planner.name):
         print("compiling the kernels for the first time (about 40 s, kept on disk) ...", file=sys.stderr)
     with progress_bar(scenario) as progress:

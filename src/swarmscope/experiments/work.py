@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from swarmscope.closure import closure_of, closure_state, libraries_of, state_of, union_of
-from swarmscope.errors import SwarmscopeError
+from swarmscope.errors import InputFileError, SwarmscopeError
 from swarmscope.judging import references
 from swarmscope.judging.cases import find_cases
 from swarmscope.judging.provenance import git_revision, installed_version, library_version, versions
@@ -94,9 +94,24 @@ def revision() -> str:
 
 
 def model_state(config: dict[str, Any]) -> str | None:
-    """Return which network the scenario's planner runs, and by which version of what; None without one."""
-    model = planner_of(PlannerModel.model_validate(config.get("planner", {}))).model
+    """Return which network the scenario's planner runs, and by which version of what; None without one.
+
+    Of a planner in a user's file, which is not run for it, it is the folder that the scenario names.
+    """
+    chosen = PlannerModel.model_validate(config.get("planner", {}))
+    if is_file_name(chosen.name):
+        return None if chosen.model is None else _folder_state(Path(chosen.model))
+    model = planner_of(chosen).model
     return None if model is None else f"{model.state()} onnxruntime {installed_version('onnxruntime')}"
+
+
+def _folder_state(folder: Path) -> str:
+    """Return a hash of the files in a folder. Errors: InputFileError."""
+    try:
+        files = sorted(file for file in folder.iterdir() if file.is_file())
+        return _hash([[file.name, hashlib.sha256(file.read_bytes()).hexdigest()] for file in files])
+    except OSError as error:
+        raise InputFileError(folder, error.strerror or "cannot be read") from None
 
 
 def unit_key(scenario: Scenario) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -28,10 +28,12 @@ from swarmscope.judging.sides import judged_by, make_advice
 from swarmscope.onboard.planners import Planner
 from swarmscope.onboard.reasons import STATE_NAMES
 from swarmscope.scenarios.places import make_setup
+from swarmscope.scenarios.read import user_files_of
 from swarmscope.scenarios.scenario import Scenario
 from swarmscope.scenarios.to_kernels import complete, make_setting
 from swarmscope.sim.loop import Setting, Trace, run
 from swarmscope.tasks import Setup
+from swarmscope.user_files import short_name, text_of
 
 ARRIVE_M = 0.05
 """Distance to the goal at which robots have arrived whose planner has no parameter ``arrive_m``."""
@@ -49,6 +51,8 @@ class Contents(NamedTuple):
     """``trajectory.npz``."""
     metrics: dict[str, Any]
     """``metrics.json``."""
+    files: Mapping[str, str]
+    """``planner.py``, ``task.py``: what a user's files said when they were run."""
 
 
 @dataclass(frozen=True)
@@ -100,7 +104,8 @@ def run_scenario(
 
 def contents(outcome: Outcome) -> Contents:
     """Return what the run folder of a finished run holds."""
-    return Contents(complete(outcome.scenario), world_table(outcome), trajectory(outcome), figures(outcome))
+    files = {f"{group}.py": text_of(file) for group, file in user_files_of(outcome.scenario).items()}
+    return Contents(complete(outcome.scenario), world_table(outcome), trajectory(outcome), figures(outcome), files)
 
 
 def figures(outcome: Outcome) -> dict[str, Any]:
@@ -155,7 +160,7 @@ def figures(outcome: Outcome) -> dict[str, Any]:
         "failures": failures(outcome),
         "run": {
             "task": place_name(scenario),
-            "planner": scenario.planner.name,
+            "planner": short_name(scenario.planner.name),
             "robots": scenario.robots,
             "seed": scenario.seed,
         },
@@ -182,7 +187,7 @@ def _model(planner: Planner) -> dict[str, str]:
 def place_name(scenario: Scenario) -> str:
     """Return what the scenario is run in, for titles."""
     if scenario.task is not None:
-        return scenario.task.name
+        return short_name(scenario.task.name)
     return Path(scenario.map.file).stem if scenario.map is not None else "place"
 
 

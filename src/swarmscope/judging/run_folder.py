@@ -29,6 +29,8 @@ from swarmscope.sim.scan_files import read_npz
 CONFIG, WORLD, TRAJECTORY, METRICS = "config.yaml", "world.json", "trajectory.npz", "metrics.json"
 REQUIRED = frozenset({CONFIG, WORLD, TRAJECTORY, METRICS})
 RUN_FILES = REQUIRED | {"paths.png", "replay.html"}
+USER_FILES = frozenset({"planner.py", "task.py"})
+"""Copies of a user's files that were run; nothing runs them again."""
 YAML_END = "...\n"
 LEFTOVER = re.compile(r"\..+\.\d+\.tmp")
 """What a killed ``swarmscope replay`` may leave in a run folder."""
@@ -40,11 +42,13 @@ def write_run(
     world: Mapping[str, Any],
     trajectory: Mapping[str, npt.NDArray[Any]],
     metrics: Mapping[str, Any],
+    files: Mapping[str, str] | None = None,
     extras: Callable[[Path], None] | None = None,
 ) -> Path:
     """Write a complete run folder at ``out`` and return its path; an earlier run there is replaced last.
 
-    ``extras`` is called with the unfinished folder to add the other ``RUN_FILES``. When anything fails,
+    ``files`` are texts of ``USER_FILES``. ``extras`` is called with the unfinished folder to add the other
+    ``RUN_FILES``. When anything fails,
     nothing of the new run stays and the earlier run is as it was.
     """
     place = _place(out)
@@ -56,6 +60,7 @@ def write_run(
         partial = place.with_name(f".{place.name}.partial-{os.getpid()}")
         partial.mkdir()
         try:
+            _write_texts(partial, files or {})
             _write_all(partial, config, world, trajectory, metrics, extras)
             with _locked(place.parent):
                 _publish(partial, place)
@@ -104,6 +109,12 @@ def read_config(run_dir: Path) -> dict[str, Any]:
         raise InputFileError(path, f"torn or foreign YAML ({type(error).__name__})") from None
 
 
+def read_user_files(run_dir: Path) -> dict[str, str]:
+    """Return the texts of the ``USER_FILES`` of a finished run; anything else raises ``InputFileError``."""
+    folder = _finished(run_dir)
+    return {name: _read_text(folder / name) for name in sorted(USER_FILES) if (folder / name).is_file()}
+
+
 def _place(out: Path) -> Path:
     place = Path(out).resolve()
     if not place.name:
@@ -118,13 +129,20 @@ def _refuse_foreign(place: Path) -> None:
     if not place.is_dir():
         raise ConfigError(str(place), "is a file; a run is written into a folder of its own")
     names = {entry.name for entry in place.iterdir() if not LEFTOVER.fullmatch(entry.name)}
-    foreign = sorted(names - RUN_FILES)
+    foreign = sorted(names - RUN_FILES - USER_FILES)
     if foreign:
         raise ConfigError(
             str(place), f"holds '{foreign[0]}', which is no part of a run; refusing to overwrite it"
         )
     if names and not names >= REQUIRED:
         raise ConfigError(str(place), f"holds '{min(names)}' but no finished run; refusing to overwrite it")
+
+
+def _write_texts(folder: Path, files: Mapping[str, str]) -> None:
+    if not files.keys() <= USER_FILES:
+        raise ValueError(f"{sorted(files.keys() - USER_FILES)}: a run folder holds {sorted(USER_FILES)}")
+    for name, text in files.items():
+        (folder / name).write_text(text, encoding="utf-8")
 
 
 def _write_all(
@@ -142,8 +160,9 @@ def _write_all(
     if extras is not None:
         extras(folder)  # pictures of a run whose data are complete; the folder itself is not in place yet
     names = {entry.name for entry in folder.iterdir()}
-    if not names <= RUN_FILES:
-        raise ValueError(f"extras wrote {sorted(names - RUN_FILES)}; a run folder holds {sorted(RUN_FILES)}")
+    if not names <= RUN_FILES | USER_FILES:
+        odd = sorted(names - RUN_FILES - USER_FILES)
+        raise ValueError(f"extras wrote {odd}; a run folder holds {sorted(RUN_FILES)}")
     for name in names:
         _sync(folder / name)
     _sync(folder)

@@ -27,8 +27,9 @@ def parse_scenario(values: Any, where: str) -> Scenario:
     if scenario.task is not None:
         _check_known("task", scenario.task.name, task_names(), where)
     _check_known("planner", scenario.planner.name, planner_names(), where)
-    if scenario.planner.model is not None and load_planner(scenario.planner.name).model is None:
-        raise ConfigError(f"{where}: planner.model", f"planner '{scenario.planner.name}' runs no network")
+    chosen = scenario.planner
+    if chosen.model is not None and not is_file_name(chosen.name) and load_planner(chosen.name).model is None:
+        raise ConfigError(f"{where}: planner.model", f"planner '{chosen.name}' runs no network")
     return scenario
 
 
@@ -60,6 +61,12 @@ def read_scenario_file(path: Path) -> dict[str, Any]:
     if isinstance(planner, dict) and isinstance(planner.get("model"), str):
         planner["model"] = _find_beside(path, planner["model"])
     return values
+
+
+def user_files_of(scenario: Scenario) -> dict[str, Path]:
+    """Return the files with code of a user that running the scenario runs: of its ``planner`` and its ``task``."""
+    names = {"planner": scenario.planner.name, "task": "" if scenario.task is None else scenario.task.name}
+    return {group: Path(name).resolve() for group, name in names.items() if is_file_name(name)}
 
 
 def find_user_files(values: dict[str, Any], folder: Path) -> None:

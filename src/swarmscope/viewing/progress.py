@@ -11,6 +11,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from swarmscope.judging.run import place_name
 from swarmscope.scenarios.scenario import Scenario
+from swarmscope.user_files import short_name
 
 
 @contextmanager
@@ -21,7 +22,7 @@ def progress_bar(scenario: Scenario, after_s: float = 0.0) -> Iterator[Callable[
     """
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[note]}"), TimeElapsedColumn())
     bar = Progress(*columns, console=Console(stderr=True), transient=True)
-    job = bar.add_task(f"{place_name(scenario)} {scenario.planner.name}", total=scenario.limit_s, note="")
+    job = bar.add_task(f"{place_name(scenario)} {short_name(scenario.planner.name)}", total=scenario.limit_s, note="")
     begun = time.monotonic()
 
     def show_when_due() -> None:

@@ -25,13 +25,15 @@ def write_report(
     out: Path,
     weight: WeightResult | None = None,
     progress: Callable[[str], None] | None = None,
+    run_files: bool = True,
 ) -> Path:
     """Write ``report.html`` (holds everything), ``report.md`` and ``figures/`` into ``out``; return the page's path.
 
-    Runs that pictures need are played again. ``progress`` is told what is being made.
+    Runs that pictures need are played again; unless ``run_files``, none that a user's file has a part
+    in. ``progress`` is told what is being made.
     """
     with style():
-        document = make_document(Material(experiment, runs, weight), progress or (lambda _: None))
+        document = make_document(Material(experiment, runs, weight), progress or (lambda _: None), run_files)
     contents = {f"{FIGURES}/{picture.name}.png": picture.png for picture in pictures_of(document)}
     contents["report.md"] = markdown_text(document).encode("utf-8")
     contents["report.html"] = page_text(document).encode("utf-8")

@@ -7,9 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from swarmscope.errors import InputFileError
 from swarmscope.experiments.results import Run
 from swarmscope.judging.run import play
-from swarmscope.scenarios.read import parse_scenario
+from swarmscope.scenarios.read import parse_scenario, user_files_of
 from swarmscope.sim.world import WorldSpec
 
 Floats = NDArray[np.float64]
@@ -32,21 +33,24 @@ class Played(NamedTuple):
 
 
 class Again:
-    """Plays runs again, each once."""
+    """Plays runs again, each once; unless ``run_files``, none that a user's file has a part in."""
 
-    def __init__(self) -> None:
+    def __init__(self, run_files: bool = True) -> None:
+        self._run_files = run_files
         self._played: dict[tuple[str, str, int], Played] = {}
 
     def of(self, run: Run) -> Played:
         """Return the run's paths; a SwarmscopeError when its scenario no longer runs (a map file that is gone)."""
         key = (run.place, run.planner, run.seed)
         if key not in self._played:
-            self._played[key] = _play(run)
+            self._played[key] = _play(run, self._run_files)
         return self._played[key]
 
 
-def _play(run: Run) -> Played:
+def _play(run: Run, run_files: bool) -> Played:
     scenario = parse_scenario(run.config, f"run of seed {run.seed}")
+    for file in user_files_of(scenario).values() if not run_files else ():
+        raise InputFileError(file, "is not run for a report; 'swarmscope experiment run' draws it, too")
     scenario = scenario.model_copy(update={"record_scans": "no"})
     outcome = play(scenario, any_angle=False)
     records, robots = outcome.trace.records, outcome.trace.robots

@@ -44,7 +44,7 @@ MOST_NAMED = 12
 """More failures than this are folded away."""
 
 
-def make_document(material: Material, progress: Progress) -> Document:
+def make_document(material: Material, progress: Progress, run_files: bool = True) -> Document:
     """Return the report of an experiment; every chapter stands even when there is nothing to put into it."""
     experiment = material.experiment
     progress("tables")
@@ -53,7 +53,7 @@ def make_document(material: Material, progress: Progress) -> Document:
         Section("Results", "results", _results(material)),
         Section("Paired differences", "differences", _differences(material)),
         Section("Failures and collisions", "failures", _failures(material)),
-        Section("Figures", "figures", _figures(material, progress)),
+        Section("Figures", "figures", _figures(material, progress, run_files)),
         Section("Parameters", "parameters", _parameters(material)),
         Section("Known differences", "notes", _notes(experiment)),
     ]
@@ -164,7 +164,7 @@ def _failures(material: Material) -> list[Block]:
     return [*blocks, Folded(f"The {len(named)} robots of {ours} that did not arrive, one by one", [table])]
 
 
-def _figures(material: Material, progress: Progress) -> list[Block]:
+def _figures(material: Material, progress: Progress, run_files: bool) -> list[Block]:
     makers: dict[str, Callable[[], list[Block]]] = {
         "boxes": lambda: list(figures.box_pictures(material)),
         "paths": lambda: _or_nothing(path_picture(material, again, progress)),
@@ -175,7 +175,7 @@ def _figures(material: Material, progress: Progress) -> list[Block]:
         "flow_time": lambda: _or_nothing(figures.flow_time_picture(material)),
         "resources": lambda: [tables.resource_table(material)] if material.main_runs() else [],
     }
-    again, blocks = Again(), list[Block]()
+    again, blocks = Again(run_files), list[Block]()
     for name in dict.fromkeys(material.experiment.figures):
         progress(f"figure: {name}")
         try:

@@ -14,6 +14,7 @@ from swarmscope.onboard.body import Body, protection_model
 from swarmscope.onboard.deciding.fields import interaction_force
 from swarmscope.onboard.planners import load_planner
 from swarmscope.scenarios.scenario import RobotModel
+from swarmscope.user_files import is_file_name
 from swarmscope.viewing.pictures import FAINT, INK
 from swarmscope.viewing.report import words
 from swarmscope.viewing.report.blocks import Picture
@@ -194,8 +195,11 @@ def _default(material: Material, sweep: Sweep) -> float | None:
 
 
 def _defaults(material: Material, planner: str) -> dict[str, float]:
+    name = str(material.planner_keys(planner).get("name", ""))
+    if is_file_name(name):
+        return {}  # only running it would tell
     try:
-        return load_planner(str(material.planner_keys(planner).get("name", ""))).defaults
+        return load_planner(name).defaults
     except SwarmscopeError:
         return {}
 

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import NamedTuple
 
-from swarmscope.errors import UnknownNameError
+from swarmscope.errors import SwarmscopeError
 from swarmscope.experiments.results import Run, TimeBudget, time_budget
 from swarmscope.experiments.weight import NEIGHBOUR_PRINTED, SELF_PRINTED, WEIGHT_PRINTED, WeightResult
 from swarmscope.judging.statistics import PairedDifference
+from swarmscope.members import told_by
 from swarmscope.onboard.planners import load_planner
+from swarmscope.user_files import is_file_name
 from swarmscope.viewing.report import words
 from swarmscope.viewing.report.blocks import Line, Mark, Row, Table, Value, cell
 from swarmscope.viewing.report.material import ALL, Material
@@ -286,7 +289,7 @@ def needs_table(material: Material) -> Table:
         keys = material.planner_keys(planner)
         name = str(keys.get("name", ""))
         summary, needs = _about(name)
-        rows.append(_row(material, planner, [[Line(name, "code")], cell(summary), cell(needs)]))
+        rows.append(_row(material, planner, [[Line(Path(name).name, "code")], cell(summary), cell(needs)]))
     return Table("What each planner does and is given.", ["", "module", "does", "is given"], rows, words=True)
 
 
@@ -302,8 +305,10 @@ def parameter_table(material: Material) -> Table:
 
 def _about(planner: str) -> tuple[str, str]:
     try:
+        if is_file_name(planner):
+            return told_by(Path(planner), "SUMMARY") or words.MISSING, told_by(Path(planner), "NEEDS") or words.MISSING
         found = load_planner(planner)
-    except UnknownNameError:
+    except SwarmscopeError:
         return "not installed", words.MISSING
     return found.summary, found.needs
 
