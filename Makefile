@@ -4,6 +4,7 @@ PYTHON  ?= python3
 VENV    ?= .venv
 OUT     ?= runs/first
 WORKERS ?= 2
+MINUTES ?= 10
 
 BIN   := $(VENV)/bin
 PIP   := $(BIN)/python -m pip --disable-pip-version-check --no-input
@@ -16,7 +17,7 @@ export SWARMSCOPE_CACHE = $(CURDIR)/.numba_cache
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help run test check bench setup setup-dev clean
+.PHONY: help run test check fuzz bench setup setup-dev clean
 
 help: ## print this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -32,6 +33,9 @@ check: setup-dev ## linter, strict types, import contract
 	$(BIN)/ruff check $(wildcard $(CODE))
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+fuzz: setup-dev ## run the property tests with new examples for MINUTES=10, until one fails
+	$(BIN)/python tests/fuzz.py --minutes $(MINUTES)
 
 bench: setup-dev ## measure speed against floors and peers
 	$(BIN)/python benchmarks/run_all.py

@@ -13,11 +13,13 @@ import numpy as np
 
 from swarmscope.errors import SwarmscopeError
 from swarmscope.experiments.work import make_job, unit_key, work, world_key
-from swarmscope.judging.run import find_references, play
+from swarmscope.judging.references import reference_ways
+from swarmscope.judging.run import play
 from swarmscope.judging.sides import make_advice
 from swarmscope.onboard.planners import load_planner, planner_names
+from swarmscope.scenarios.places import make_setup
 from swarmscope.scenarios.read import parse_scenario
-from swarmscope.scenarios.to_kernels import complete, make_setup
+from swarmscope.scenarios.to_kernels import complete
 
 MILLION = 1e6
 HOUR = 3600.0
@@ -35,7 +37,7 @@ def costs(planner: str, seed: int) -> dict[str, float]:
     times = [time.perf_counter()]
     setup = make_setup(scenario)
     times.append(time.perf_counter())
-    references = find_references(scenario, setup)
+    references = reference_ways(setup, scenario.robot.radius_m)
     times.append(time.perf_counter())
     if load_planner(planner).told:
         make_advice(setup, scenario.robot.radius_m + scenario.safety.margin_m)
@@ -47,7 +49,7 @@ def costs(planner: str, seed: int) -> dict[str, float]:
         "any_angle_m": references.any_angle_m.tolist(),
         "wall_s": 0.0,
     }
-    job = make_job(unit_key(config), world_key(scenario), config, known)
+    job = make_job(unit_key(scenario), world_key(scenario), config, known)
     times.append(time.perf_counter())
     work(job)
     whole = time.perf_counter() - times[-1]

@@ -15,8 +15,9 @@ from swarmscope.onboard.planners import load_planner
 from swarmscope.onboard.rig import Rig
 from swarmscope.onboard.sharing.message import Head, encode_features
 from swarmscope.onboard.view import Swarm, new_swarm
+from swarmscope.scenarios.places import make_setup
 from swarmscope.scenarios.read import parse_scenario
-from swarmscope.scenarios.to_kernels import make_rig_of, make_setup
+from swarmscope.scenarios.to_kernels import make_rig_of
 from swarmscope.sim.lidar import cast_static, make_beams
 from swarmscope.sim.world import compile_world
 

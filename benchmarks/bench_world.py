@@ -5,8 +5,9 @@ from __future__ import annotations
 import argparse
 import time
 
+from swarmscope.scenarios.places import make_setup
 from swarmscope.scenarios.read import parse_scenario
-from swarmscope.scenarios.to_kernels import make_setting, make_setup
+from swarmscope.scenarios.to_kernels import make_setting
 from swarmscope.sim.loop import run
 
 NOISE = {

@@ -25,8 +25,9 @@ from swarmscope.onboard.perception.filters import (
 )
 from swarmscope.onboard.perception.safety import safe_directions
 from swarmscope.onboard.rig import AHEAD, PRINTED, Rig
+from swarmscope.scenarios.places import make_setup
 from swarmscope.scenarios.read import parse_scenario
-from swarmscope.scenarios.to_kernels import make_rig_of, make_setup
+from swarmscope.scenarios.to_kernels import make_rig_of
 from swarmscope.sim.lidar import cast_static, make_beams
 from swarmscope.sim.world import compile_world
 

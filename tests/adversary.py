@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from swarmscope._jit import jit
 from swarmscope.onboard.control.guard import guard
 from swarmscope.onboard.sharing.tracks import update_odometry, update_tracks
+from swarmscope.onboard.view import view_of
 from swarmscope.sim.cells import index_robots
 from swarmscope.sim.motion import judge, move
 from swarmscope.sim.sensing import sense
@@ -28,25 +27,27 @@ def _nearest_bearing(ranges, angle_min, increment):
 
 
 @jit
-def _run(sim, shared, rig, near, ticks, mode):
+def _run(sim, swarm, ticks, mode):
+    rig = swarm.rig
     smallest = math.inf
     robots = sim.robots.size
     index_robots(sim)
     for tick in range(ticks):
         sense(sim, tick, 0, robots)
         for i in range(robots):
-            decision = sim.decisions[i]
+            see = view_of(swarm, i)
+            decision = see.out
             when = tick // 8 if mode == STUBBORN else tick
             decision["v"] = sim.v_max * (1.5 * uniform(key(sim.clock.seed, i, when, 101)) - 0.1)
             decision["w"] = sim.w_max * (2.4 * uniform(key(sim.clock.seed, i, when, 102)) - 1.2)
             if mode == CHASE and uniform(key(sim.clock.seed, i, tick // 5, 103)) < 0.8:
                 decision["v"] = sim.v_max
                 decision["w"] = (
-                    _nearest_bearing(sim.ranges[i], rig.sensor.angle_min, rig.sensor.increment) / sim.clock.dt
+                    _nearest_bearing(see.scan, rig.sensor.angle_min, rig.sensor.increment) / sim.clock.dt
                 )
-            dx, dy = update_odometry(sim.percepts[i], shared[i])
-            update_tracks(sim.percepts[i], shared[i], rig, dx, dy)
-            guard(sim.ranges[i], sim.percepts[i], shared[i], decision, near, rig)
+            dx, dy = update_odometry(see.percept, see.shared)
+            update_tracks(see.percept, see.shared, rig, dx, dy)
+            guard(see)
         move(sim, tick, 0, robots)
         judge(sim, tick)
         for i in range(robots):
@@ -57,6 +58,6 @@ def _run(sim, shared, rig, near, ticks, mode):
     return smallest
 
 
-def closest(sim, shared, rig, ticks, mode):
+def closest(sim, swarm, ticks, mode):
     """The smallest clearance [m] of any robot in ``ticks`` ticks, -1 after a contact."""
-    return _run(sim, shared, rig, np.zeros(rig.sensor.beams + 1, np.int16), ticks, mode)
+    return _run(sim, swarm, ticks, mode)

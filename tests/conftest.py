@@ -5,4 +5,11 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from hypothesis import settings
+
 os.environ.setdefault("SWARMSCOPE_CACHE", str(Path(__file__).resolve().parent.parent / ".numba_cache"))
+
+# No deadlines: the first call of a kernel compiles it. No database: what is drawn depends on nothing but the tests.
+settings.register_profile("fixed", derandomize=True, deadline=None, database=None)
+settings.register_profile("fuzz", derandomize=False, deadline=None, database=None, max_examples=500, print_blob=True)
+settings.load_profile("fixed")

@@ -3,23 +3,18 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
-from hypothesis import settings
 
 from swarmscope.onboard.body import Body
-from swarmscope.onboard.percept import DECISION, PERCEPT, new_shared
-from swarmscope.onboard.rig import make_rig
+from swarmscope.onboard.planners import load_planner
+from swarmscope.onboard.rig import Guarding, Safety, Sharing, make_rig
+from swarmscope.onboard.rows import Rows
 from swarmscope.onboard.sensor import Sensor
-from swarmscope.onboard.view import new_swarm
 from swarmscope.sim.lidar import cast_static, make_beams
-from swarmscope.sim.state import Clock, Noise, Radio, new_sim
+from swarmscope.sim.state import Clock, Noise, Radio, Start, new_sim
 from swarmscope.sim.world import Circle, WorldSpec, compile_world
-
-settings.register_profile(
-    "kernels", deadline=None, derandomize=True
-)  # the first call of a kernel compiles it
-settings.load_profile("kernels")
 
 DT = 0.2
 BOUNDS = (-10.0, -10.0, 10.0, 10.0)
@@ -33,7 +28,12 @@ def make_sensor(beams=360, fov=2.0 * math.pi, range_max=5.0, range_min=0.0, **er
 
 
 def rig_of(body=None, sensor=None, **options):
-    return make_rig(body or Body(), sensor or make_sensor(), **options)
+    """A robot's constants; ``options`` are fields of ``Guarding``, ``Safety`` and ``Sharing``."""
+    groups = []
+    for kind in (Guarding, Safety, Sharing):
+        groups.append(kind(**{name: options.pop(name) for name in kind._fields if name in options}))
+    assert not options, options
+    return make_rig(body or Body(), sensor or make_sensor(), *groups)
 
 
 def beams_of(rig):
@@ -61,59 +61,43 @@ def mirrored(ranges):
     return np.roll(ranges[::-1], 1).copy()
 
 
-class Rows:
-    """The rows of some robots outside any simulation: what a test fills in and kernels work on."""
+class Seen(NamedTuple):
+    """A neighbour as mutual positioning reports it, body frame."""
 
-    def __init__(self, rig, robots=1):
-        self.rig = rig
-        self.percepts = np.zeros(robots, PERCEPT)
-        self.percepts["dt_s"] = DT
-        self.percepts["id"] = np.arange(robots)
-        self.decisions = np.zeros(robots, DECISION)
-        self.decisions["p_self"] = self.decisions["p_left"] = np.nan
-        self.shared = new_shared(robots)
-        self.scratch = new_scratch(robots, rig)
-        self.ranges = np.full((robots, rig.sensor.beams), np.inf, np.float32)
+    address: int
+    x: float
+    y: float
+    yaw: float
 
-    @property
-    def percept(self):
-        return self.percepts[0]
 
-    @property
-    def decision(self):
-        return self.decisions[0]
+def seen(address, x, y, yaw=0.0):
+    return Seen(address=int(address), x=float(x), y=float(y), yaw=float(yaw))
 
-    @property
-    def memory(self):
-        return self.shared[0]
 
-    def see(self, *neighbours):
-        """Let robot 0 see neighbours (id, x, y, yaw), body frame."""
-        self.percepts["n_neighbours"][0] = len(neighbours)
-        for k, (name, x, y, yaw) in enumerate(neighbours):
-            self.percepts["neighbour_id"][0, k] = name
-            self.percepts["neighbour_x"][0, k], self.percepts["neighbour_y"][0, k] = x, y
-            self.percepts["neighbour_yaw"][0, k] = yaw
+def one_robot(rig=None, planner="nav-scope", address=0, **params):
+    """The rows of a robot that has seen nothing yet; ``planner`` is one, or its name."""
+    chosen = load_planner(planner) if isinstance(planner, str) else planner
+    rows = Rows(chosen, rig or rig_of(), chosen.params(params), address)
+    rows.fill(dt_s=DT)
+    return rows
 
-    def receive(self, *packets):
-        """Hand packets (bytes) to robot 0."""
-        self.percepts["n_packets"][0] = len(packets)
-        for k, packet in enumerate(packets):
-            self.percepts["packet_length"][0, k] = len(packet)
-            self.percepts["packet"][0, k, : len(packet)] = np.frombuffer(packet, np.uint8)
+
+def tick(rows):
+    """Let a robot make one step and time go on; return what it decided."""
+    rows.step()
+    rows.percept["now_s"] += DT
+    return rows.decision
 
 
 def place_sim(starts, goals=None, world=None, rig=None, noise=None, radio=None, **clock):
-    """A simulation of robots at ``starts`` (x, y, yaw); goals default to the starts."""
+    """A simulation of robots at ``starts`` (x, y, yaw) and their rows; goals default to the starts."""
     rig = rig or rig_of()
     starts = np.asarray(starts, float)
     goals = starts[:, :2] if goals is None else np.asarray(goals, float)
     clock = Clock(**({"seed": 0, "dt": DT, "substeps": 20} | clock))
     world = world_of() if world is None else world
-    sim, shared, scratch = new_sim(
-        world, BOUNDS, beams_of(rig), rig, starts, goals, noise or Noise(), radio or Radio(), clock
-    )
-    return sim, shared, scratch
+    start, air = Start(starts, goals, BOUNDS), (noise or Noise(), radio or Radio())
+    return new_sim(world, beams_of(rig), rig, start, air, clock)
 
 
 def place_scenario(starts, goals, obstacles=(), bounds=BOUNDS, **more):
@@ -128,8 +112,9 @@ def place_scenario(starts, goals, obstacles=(), bounds=BOUNDS, **more):
 
 def run_scenario(values, threads=1):
     """Run a scenario given as a mapping; return its trace."""
+    from swarmscope.scenarios.places import make_setup
     from swarmscope.scenarios.read import parse_scenario
-    from swarmscope.scenarios.to_kernels import make_setting, make_setup
+    from swarmscope.scenarios.to_kernels import make_setting
     from swarmscope.sim.loop import run
 
     scenario = parse_scenario(values, "test")

@@ -10,61 +10,103 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 import shutil
+import sys
+import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
 
+from swarmscope.closure import OF_A_USER, PACKAGE, closure_state, module_of
+
 F = TypeVar("F", bound=Callable[..., Any])
 
-
-PACKAGE = Path(__file__).parent
-NO_KERNELS = frozenset({"api.py", "cli", "viewing", "scenarios", "judging", "experiments"})
-"""Parts without kernels; the few files of theirs that have some import this module and are found by that."""
-KEPT_CACHES = 8
-"""Kernel caches of earlier states of the sources that are left on disk."""
-
-
-def kernel_sources() -> list[Path]:
-    """Return the files that can change what a kernel does."""
-    files = sorted(PACKAGE.rglob("*.py"))
-    return [f for f in files if f.relative_to(PACKAGE).parts[0] not in NO_KERNELS or b"_jit import" in f.read_bytes()]
+KEPT_STATES = 4
+"""Kernel caches of earlier states of one module that are left on disk."""
+FORMER = re.compile(r"[0-9a-f]{16}")
+"""Folders as they were called when one of them held the kernels of all modules."""
+FORMER_S = 7 * 24 * 3600.0
 
 
-def cache_folder() -> Path:
-    """Return the folder for the kernels of this state of the sources, in SWARMSCOPE_CACHE or the user's cache.
-
-    Numba compiles a cached kernel anew when its own file has changed, but not when a function that it calls
-    from another file does; a folder for each state of the sources rules out results of mixed versions.
-    """
-    state = hashlib.sha256()
-    for file in kernel_sources():
-        state.update(file.relative_to(PACKAGE).as_posix().encode() + file.read_bytes())
+def kernel_folder() -> Path:
+    """Return the folder with the compiled kernels of all modules: in SWARMSCOPE_CACHE or the user's cache."""
     user = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "swarmscope"
-    return Path(os.environ.get("SWARMSCOPE_CACHE") or user) / "kernels" / state.hexdigest()[:16]
+    return Path(os.environ.get("SWARMSCOPE_CACHE") or user) / "kernels"
 
 
-def use_own_cache() -> None:
-    """Keep kernels in ``cache_folder`` unless NUMBA_CACHE_DIR says where; forget the oldest others."""
-    if os.environ.get("NUMBA_CACHE_DIR"):
-        return
+def cache_folder(file: Path, state: str) -> Path | None:
+    """Return the folder for the kernels of one file in one state; None if there cannot be one.
+
+    Numba compiles a cached kernel anew when its own file has changed, but not when a function that it calls from
+    another file does; a folder for each state of everything that the file imports (see ``closure``) rules out results
+    of mixed versions, and leaves alone what does not import a file that was edited.
+    """
     try:
-        folder = cache_folder()
-        folder.mkdir(parents=True, exist_ok=True)
-        folder.touch()
-        others = sorted(folder.parent.iterdir(), key=lambda other: other.stat().st_mtime, reverse=True)
+        return _made(file, state)
     except (OSError, RuntimeError):
-        return  # no home, or no room: Numba finds a place of its own
-    for other in others[KEPT_CACHES:]:
-        shutil.rmtree(other, ignore_errors=True)
+        return None  # no home, or no room: Numba finds a place of its own
+
+
+@cache
+def _made(file: Path, state: str) -> Path:
+    place = kernel_folder() / _label(file) / state
+    place.mkdir(parents=True, exist_ok=True)
+    place.touch()
+    _forget(place.parent)
+    return place
+
+
+def _label(file: Path) -> str:
+    """Return the module's name; files of a user that are called alike are told apart by where they lie."""
+    name = module_of(file)
+    if file.is_relative_to(PACKAGE):
+        return name
+    return f"{name}-{hashlib.sha256(str(file).encode()).hexdigest()[:8]}"
+
+
+def _forget(folder: Path) -> None:
+    """Remove the caches of a module's oldest states."""
+    states = sorted(folder.iterdir(), key=lambda state: state.stat().st_mtime, reverse=True)
+    for state in states[KEPT_STATES:]:
+        shutil.rmtree(state, ignore_errors=True)
+
+
+def _forget_former() -> None:
+    """Remove the caches that earlier versions left, a week after their last use."""
+    try:
+        for folder in kernel_folder().iterdir():
+            if FORMER.fullmatch(folder.name) and time.time() - folder.stat().st_mtime > FORMER_S:
+                shutil.rmtree(folder, ignore_errors=True)
+    except (OSError, RuntimeError):
+        return
+
+
+_forget_former()
+
+
+@contextmanager
+def _cached_in(folder: Path | None) -> Iterator[None]:
+    """Let Numba keep the kernels that are decorated meanwhile in ``folder``; NUMBA_CACHE_DIR goes before.
+
+    Numba asks for the folder when a function is decorated, and never again.
+    """
     config: Any = numba.config
+    if folder is None or os.environ.get("NUMBA_CACHE_DIR"):
+        yield
+        return
+    before = config.CACHE_DIR
     config.CACHE_DIR = str(folder)
+    try:
+        yield
+    finally:
+        config.CACHE_DIR = before
 
-
-use_own_cache()
 
 OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 LEAN = OPTIONS | {"_nrt": False, "no_cfunc_wrapper": True}
@@ -76,19 +118,40 @@ short kernels, and a kernel that allocates does not compile."""
 warnings.filterwarnings("ignore", "Record.*has been considered a subtype", numba.NumbaExperimentalFeatureWarning)
 
 
-def _compile(function: F, options: dict[str, Any]) -> F:
+def jit_for(function: F, file: Path | None = None, options: dict[str, Any] = LEAN) -> F:
+    """Compile ``function``; its cached code is valid as long as nothing changes in what its file imports.
+
+    With ``file``, what that one imports counts, too: a loop that is made from one file's code with functions of
+    another one depends on both.
+    """
     njit: Any = numba.njit
-    return cast("F", njit(**options)(function))
+    with _cached_in(_cache_of(function, file)):
+        return cast("F", njit(**options)(function))
+
+
+def _cache_of(function: Callable[..., Any], file: Path | None) -> Path | None:
+    config: Any = numba.config
+    if config.DISABLE_JIT:
+        return None
+    own = Path(os.path.realpath(function.__code__.co_filename))
+    place = own if file is None else Path(os.path.realpath(file))
+    package = function.__module__.partition(".")[0]
+    folder = Path(sys.modules[package].__path__[0]) if package.startswith(OF_A_USER) else None
+    try:
+        states = [closure_state(one, folder) for one in dict.fromkeys((place, own))]
+    except OSError:
+        return None  # made from text: there is no such file
+    return cache_folder(place, hashlib.sha256("".join(states).encode()).hexdigest()[:16])
 
 
 def jit(function: F) -> F:
     """Compile ``function`` in nopython mode, cached on disk; it may not allocate."""
-    return _compile(function, LEAN)
+    return jit_for(function)
 
 
 def jit_inline(function: F) -> F:
     """Compile a tiny scalar helper so that LLVM always inlines it into its caller."""
-    return _compile(function, LEAN | {"forceinline": True})
+    return jit_for(function, options=LEAN | {"forceinline": True})
 
 
 def jit_inner(function: F) -> F:
@@ -99,14 +162,14 @@ def jit_inner(function: F) -> F:
     """
     if not function.__name__.startswith("_"):
         raise ValueError(f"{function.__name__}: only private kernels can do without a Python wrapper")
-    return _compile(function, LEAN | {"forceinline": True, "no_cpython_wrapper": True})
+    return jit_for(function, options=LEAN | {"forceinline": True, "no_cpython_wrapper": True})
 
 
 def jit_alloc(function: F) -> F:
     """Compile ``function`` in nopython mode, cached on disk; it may allocate (set-up and evaluation only)."""
-    return _compile(function, OPTIONS)
+    return jit_for(function, options=OPTIONS)
 
 
 def jit_paste(function: F) -> F:
     """Paste ``function`` into its callers before they are typed; for what returns views of arrays of records."""
-    return _compile(function, LEAN | {"inline": "always"})
+    return jit_for(function, options=LEAN | {"inline": "always"})

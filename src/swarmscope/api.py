@@ -17,7 +17,8 @@ from pydantic import ValidationError
 
 from swarmscope.errors import ConfigError, InputFileError
 from swarmscope.experiments.warm_up import kernels_are_cold
-from swarmscope.judging.run import Contents, References, contents, play, reference_ways
+from swarmscope.judging.references import References, reference_ways
+from swarmscope.judging.run import Contents, contents, play
 from swarmscope.judging.run_folder import WORLD, read_config, read_world, write_run
 from swarmscope.scenarios.overrides import choose, leave_only, override
 from swarmscope.scenarios.plain import plain

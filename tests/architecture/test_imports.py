@@ -24,7 +24,7 @@ BLOCKED = (
     "swarmscope.tasks",
 )
 ONBOARD = sorted(SRC.glob("onboard/**/*.py"))
-LIBRARIES = {"orca.py": "navground", "_giwt_network.py": "onnxruntime"}
+LIBRARIES = {"planning/orca.py": "navground", "network/model.py": "onnxruntime"}
 """Planners that a library helps; the library is loaded when the planner is used."""
 SOURCES = sorted(SRC.glob("**/*.py"))
 
@@ -66,16 +66,18 @@ except ImportError:
 
 @pytest.mark.parametrize("path", ONBOARD, ids=module_of)
 def test_on_board_modules_import_only_what_a_robot_has(path):
-    allowed = ("numpy", "swarmscope.onboard", "swarmscope._jit", "swarmscope.geometry", "swarmscope.errors")
-    for name in imports_of(path):
+    ours = ("onboard", "_jit", "geometry", "errors", "members", "bounds", "user_files", "closure")
+    allowed = ("numpy", *(f"swarmscope.{name}" for name in ours))
+    library = LIBRARIES.get(path.relative_to(SRC / "onboard").as_posix())
+    for name in set(imports_of(path)) - {"swarmscope"}:
         root = name.split(".")[0]
-        assert name.startswith(allowed) or root in sys.stdlib_module_names or root == LIBRARIES.get(path.name), name
+        assert name.startswith(allowed) or root in sys.stdlib_module_names or root == library, name
 
 
 @pytest.mark.parametrize("path", [p for p in SOURCES if p.name != "_jit.py"], ids=module_of)
 def test_numba_is_configured_in_one_place(path):
     names = {name.split(".")[0] for name in imports_of(path)}
-    assert not names & {"numba", "llvmlite"} or path.parts[-2:] == ("evaluation", "provenance.py")
+    assert not names & {"numba", "llvmlite"} or path.parts[-2:] == ("judging", "provenance.py")
 
 
 JITS = {
@@ -123,3 +125,58 @@ def test_the_source_tree_is_read_at_all():
     assert {"jit", "jit_inline"} <= JITS
     assert len(kernels) > 40
     assert {"guard", "safe_directions", "sense", "move"} <= set(kernels)
+
+
+def code_at_run_time(node):
+    """A node and all below it but what stands under ``if TYPE_CHECKING:``."""
+    yield node
+    checked_only = isinstance(node, ast.If) and ast.unparse(node.test) in ("TYPE_CHECKING", "typing.TYPE_CHECKING")
+    for child in node.orelse if checked_only else ast.iter_child_nodes(node):
+        yield from code_at_run_time(child)
+
+
+def import_graph(sources):
+    """{module: modules of these sources that its code imports, anywhere in it}; a name counts for its module."""
+    graph = {}
+    for module, text in sources.items():
+        names = set()
+        for node in code_at_run_time(ast.parse(text)):
+            if isinstance(node, ast.Import):
+                names |= {alias.name for alias in node.names}
+            elif isinstance(node, ast.ImportFrom):
+                assert not node.level, f"{module} imports relatively"
+                whole = {f"{node.module}.{alias.name}" for alias in node.names}
+                names |= whole if whole <= set(sources) else {node.module} | whole
+        graph[module] = names & set(sources) - {module}
+    return graph
+
+
+def circles(graph):
+    """The sets of two and more modules that all reach one another."""
+    reached = {}
+    for module in graph:
+        reached[module], ahead = set(), [module]
+        while ahead:
+            new = graph[ahead.pop()] - reached[module]
+            reached[module] |= new
+            ahead += new
+    together = {frozenset(m for m in reached[module] if module in reached[m]) for module in graph}
+    return sorted(sorted(members) for members in together if members)
+
+
+def test_no_modules_import_one_another():
+    graph = import_graph({module_of(path): path.read_text(encoding="utf-8") for path in SOURCES})
+    assert "swarmscope.disk.rules" in graph["swarmscope.disk.geodesic"]
+    assert circles(graph) == []
+
+
+def test_circles_are_found_also_through_functions_but_not_through_types():
+    sources = {
+        "p.a": "from p import b",
+        "p.b": "def f():\n    if f:\n        import p.c",
+        "p.c": "from p.a import name",
+        "p.d": "import p.a\nif TYPE_CHECKING:\n    import p.e",
+        "p.e": "from p.d import name",
+        "p": "",
+    }
+    assert circles(import_graph(sources)) == [["p.a", "p.b", "p.c"]]

@@ -10,8 +10,7 @@ import pytest
 from swarmscope import tasks
 from swarmscope.errors import UnknownNameError
 from swarmscope.onboard import planning
-from swarmscope.onboard.planners import load_planner, planner_names
-from swarmscope.onboard.reasons import NOT_PLANNERS
+from swarmscope.onboard.planners import all_planners, load_planner, planner_names
 from swarmscope.tasks._contract import load_task, task_names
 
 
@@ -20,10 +19,20 @@ def files_of(package):
     return {path.stem for path in folder.glob("*.py") if not path.stem.startswith("_")}
 
 
-def test_the_planners_are_the_files_of_their_folder():
-    files = files_of(planning) - NOT_PLANNERS
-    assert {name.replace("-", "_") for name in planner_names()} == files
+def test_the_planners_are_the_files_of_their_folder_and_their_variants():
+    found = all_planners()
+    modules = {planner.module for planner in found.values()}
+    assert {module.__name__.rpartition(".")[2] for module in modules} == files_of(planning)
+    assert {module.NAME.replace("-", "_") for module in modules} == files_of(planning)
+    variants = [name for module in modules for name in getattr(module, "VARIANTS", {})]
+    assert sorted([*(module.NAME for module in modules), *variants]) == planner_names()
+    assert {"nav-i", "oracle", "sfm-i", "giwt-cnn", "giwt-gat", "giwt-sage"} == set(variants)
     assert planner_names() == sorted(planner_names())
+
+
+@pytest.mark.parametrize("name", planner_names())
+def test_a_planner_is_found_by_its_name_alone(name):
+    assert load_planner(name) == all_planners()[name]
 
 
 def test_the_tasks_are_the_files_of_their_folder():
@@ -33,13 +42,14 @@ def test_the_tasks_are_the_files_of_their_folder():
 @pytest.mark.parametrize("name", planner_names())
 def test_a_planner_file_defines_what_the_contract_asks_for(name):
     planner = load_planner(name)
-    assert name == planner.NAME
-    assert len(planner.SUMMARY) > 10
-    assert len(planner.NEEDS) > 10
-    assert isinstance(planner.MEMORY, np.dtype)
+    assert name == planner.name
+    assert len(planner.summary) > 10
+    assert len(planner.needs) > 10
+    assert isinstance(planner.module.MEMORY, np.dtype)
     assert planner.new_memory(3).shape == (3,)
-    assert planner.new_memory(3).dtype == planner.MEMORY
-    assert make_params(planner, {}) == planner.Params()
+    assert planner.new_memory(3).dtype == planner.module.MEMORY
+    assert planner.params({}) == planner.params_type()._replace(**planner.fixed)
+    assert set(planner.fixed) <= set(planner.params_type._fields)
 
 
 @pytest.mark.parametrize("name", task_names())
@@ -49,7 +59,7 @@ def test_a_task_file_defines_what_the_contract_asks_for(name):
     assert len(task.SUMMARY) > 10
 
 
-@pytest.mark.parametrize("name", ["nav-scop", "nav_scope", "fields", "_contract", ""])
+@pytest.mark.parametrize("name", ["nav-scop", "nav_scope", "fields", "_contract", "loops", ""])
 def test_an_unknown_planner_is_an_error_with_the_names(name):
     with pytest.raises(UnknownNameError, match="nav-scope"):
         load_planner(name)
@@ -57,15 +67,16 @@ def test_an_unknown_planner_is_an_error_with_the_names(name):
 
 def test_an_unknown_parameter_is_an_error_with_the_nearest_name():
     with pytest.raises(UnknownNameError, match="w_i"):
-        make_params(load_planner("nav-scope"), {"w_j": 1.0})
+        load_planner("nav-scope").params({"w_j": 1.0})
 
 
 def test_parameters_take_the_declared_type():
-    params = make_params(load_planner("nav-scope"), {"w_i": 0})
+    params = load_planner("nav-scope").params({"w_i": 0})
     assert isinstance(params.w_i, float)
 
 
 def test_no_two_planners_share_a_type_of_parameters():
-    names = [load_planner(name).Params.__name__ for name in planner_names()]
-    kinds = {load_planner(name).Params for name in planner_names()}
-    assert len(set(names)) == len(kinds)
+    """But for variants, whose parameters are those of their file's planner."""
+    names = [load_planner(name).params_type.__name__ for name in planner_names()]
+    kinds = {load_planner(name).params_type for name in planner_names()}
+    assert len(set(names)) == len(kinds) == len(files_of(planning))

@@ -4,25 +4,26 @@ import numpy as np
 import pytest
 
 from swarmscope.disk import check, maps, random_maps, rules, runs
+from swarmscope.disk.find_map import find_map
 from swarmscope.errors import ConfigError, InputFileError, UnknownNameError, UnsolvableWorldError
 
 
 def test_the_five_maps_of_the_report():
     assert [len(one.obstacles) for one in maps.REPORT_MAPS.values()] == [3, 5, 2, 1, 5]
-    assert maps.find_map("crevice", rules.Rules()).as_dicts()[1] == {"center": (0.5, -0.22), "radius": 0.2}
+    assert find_map("crevice", rules.Rules()).as_dicts()[1] == {"center": (0.5, -0.22), "radius": 0.2}
 
 
 def test_unknown_names_are_told():
     with pytest.raises(UnknownNameError, match="did you mean 'crevice'"):
-        maps.find_map("crevise", rules.Rules())
+        find_map("crevise", rules.Rules())
     with pytest.raises(ConfigError, match="whole number"):
-        maps.find_map("random:x", rules.Rules())
+        find_map("random:x", rules.Rules())
 
 
 def test_a_map_is_read_from_a_file(tmp_path):
     file = tmp_path / "mine.yaml"
     file.write_text("obstacles:\n  - {center: [0.1, 0.2], radius: 0.05}\n")
-    assert maps.find_map(str(file), rules.Rules()).obstacles.tolist() == [[0.1, 0.2, 0.05]]
+    assert find_map(str(file), rules.Rules()).obstacles.tolist() == [[0.1, 0.2, 0.05]]
 
 
 @pytest.mark.parametrize(

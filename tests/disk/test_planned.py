@@ -7,12 +7,13 @@ import pytest
 
 from swarmscope.disk import bounds, maps, random_maps, rules, runs
 from swarmscope.disk.controllers import _elastic, _paths, _schedule, find
+from swarmscope.disk.find_map import find_map
 
 NO_DISCS = np.empty((0, 3))
 
 
 def play(name, permutations, **numbers):
-    of = runs.problem(rules.Rules(n=len(permutations[0])), [maps.find_map(name, rules.Rules())], permutations)
+    of = runs.problem(rules.Rules(n=len(permutations[0])), [find_map(name, rules.Rules())], permutations)
     kind = find("planned", numbers)
     return of, runs.play(of, kind.create(of, kind.params))
 

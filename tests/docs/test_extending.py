@@ -88,7 +88,7 @@ def test_the_copy_is_what_was_tested_and_the_new_names_are_listed(tree):
     folder, _ = tree
     code = (
         "import swarmscope\n"
-        "from swarmscope.onboard.planning._contract import planner_names\n"
+        "from swarmscope.onboard.planners import planner_names\n"
         "from swarmscope.tasks import task_names\n"
         "print(swarmscope.__file__, *planner_names(), *task_names())"
     )

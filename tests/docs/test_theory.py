@@ -11,8 +11,6 @@ from pathlib import Path
 import pytest
 
 from swarmscope.onboard.body import Body, protection_model
-from swarmscope.onboard.perception.areas import normalise, passable_distance, quadrant_area
-from swarmscope.onboard.planning import nav_scope
 from swarmscope.onboard.deciding.fields import (
     following_probability,
     fuse,
@@ -21,6 +19,8 @@ from swarmscope.onboard.deciding.fields import (
     neighbour_weight,
     yields_to,
 )
+from swarmscope.onboard.perception.areas import normalise, passable_distance, quadrant_area
+from swarmscope.onboard.planning import nav_scope
 from swarmscope.scenarios.scenario import SafetyModel
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -14,7 +14,6 @@ from swarmscope.experiments.experiment import (
     units,
 )
 from swarmscope.experiments.work import unit_key, world_key
-from swarmscope.scenarios.to_kernels import complete
 
 
 def test_units_are_every_place_label_and_seed():
@@ -27,7 +26,7 @@ def test_units_are_every_place_label_and_seed():
 
 
 def test_the_key_is_that_of_the_content():
-    keys = {(u.planner, u.place, u.seed): unit_key(complete(u.scenario)) for u in units(small())}
+    keys = {(u.planner, u.place, u.seed): unit_key(u.scenario) for u in units(small())}
     assert keys["alone", "near", 1000] == keys["Nav-SCOPE w_i=0", "near", 1000]
     assert len(set(keys.values())) == 24
     worlds = {world_key(u.scenario) for u in units(small())}

@@ -8,14 +8,13 @@ import math
 import numpy as np
 import pytest
 
-from helpers import circles_world, rig_of, scan_at
+from helpers import circles_world, one_robot, rig_of, scan_at
 from swarmscope.cli.perceive import SCAN_FOLDER
 from swarmscope.errors import ConfigError, InputFileError
 from swarmscope.experiments.perceive import perceive, write_features
-from swarmscope.onboard.percept import PERCEPT
-from swarmscope.onboard.view import new_swarm
 from swarmscope.onboard.perception.safety import safe_directions
-from swarmscope.onboard.tick import features
+from swarmscope.onboard.rig import AHEAD
+from swarmscope.onboard.tick import own_features
 from swarmscope.sim.scan_files import ScanLog, load_scans
 from swarmscope.viewing.perceive_picture import PANELS, write_perceive_picture
 
@@ -70,17 +69,14 @@ def test_it_is_what_the_robots_kernels_say(forest_scans):
     seen = perceive(log_of(forest_scans))
     rig = seen.rig
     assert rig.sensor.wraps
-    scratch, percept = new_scratch(1, rig), np.zeros(1, PERCEPT)
     for k, scan in enumerate(forest_scans):
-        sensor = rig.sensor
-        safe_directions(
-            scan, sensor.range_min, sensor.range_max, sensor.wraps, rig.reach[0], scratch.edges[0], scratch.safe[0]
-        )
-        rows = (scratch.padded[0], scratch.angles[0], scratch.distances[0], scratch.filtered[0])
-        count = features(scan, percept[0], scratch.edges[0], scratch.narrow[0], *rows, rig)
-        assert np.array_equal(seen.safe[k], scratch.safe[0] == 1)
+        see = one_robot(rig).view
+        see.masked[:] = scan
+        safe_directions(see.masked, rig.sensor, rig.reach[AHEAD], see.edges, see.safe)
+        count = own_features(see)
+        assert np.array_equal(seen.safe[k], see.safe == 1)
         assert len(seen.features[k]) == count > 0
-        assert np.allclose(seen.features[k][:, 1], scratch.distances[0, 0, :count])
+        assert np.allclose(seen.features[k][:, 1], see.own.distances[:count])
 
 
 def test_turning_the_sensor_turns_the_features(forest_scans):

@@ -10,6 +10,7 @@ import pytest
 
 from helpers import circle, place_scenario, wall
 from swarmscope.errors import ConfigError
+from swarmscope.judging import references
 from swarmscope.judging import run as runner
 from swarmscope.judging.run_folder import read_config, read_metrics, read_trajectory, read_world
 from swarmscope.scenarios.read import parse_scenario
@@ -183,7 +184,7 @@ def test_without_recorded_scans_their_arrays_are_empty(tmp_path):
 
 
 def test_large_swarms_get_references_for_some_robots_only(monkeypatch):
-    monkeypatch.setattr(runner, "SEARCHED_M2", 2000.0)
+    monkeypatch.setattr(references, "SEARCHED_M2", 2000.0)
     outcome = runner.play(scenario_of(robots=15, limit_s=1.0))
     known = np.flatnonzero(np.isfinite(outcome.references.shortest_m))
     assert known[0] == 0 and known[-1] == 14 and 2 <= len(known) < 15
@@ -192,7 +193,7 @@ def test_large_swarms_get_references_for_some_robots_only(monkeypatch):
 
 def test_any_angle_references_are_left_out_when_not_wanted_or_too_many(monkeypatch):
     assert np.isnan(runner.play(scenario_of(limit_s=1.0), any_angle=False).references.any_angle_m).all()
-    monkeypatch.setattr(runner, "ANY_ANGLE_ROBOTS", 3)
+    monkeypatch.setattr(references, "ANY_ANGLE_ROBOTS", 3)
     assert np.isnan(runner.play(scenario_of(limit_s=1.0)).references.any_angle_m).all()
 
 

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from helpers import circle, place_scenario
 from swarmscope.judging.sides import cost_to_go, make_advice
+from swarmscope.scenarios.places import make_setup
 from swarmscope.scenarios.read import parse_scenario
-from swarmscope.scenarios.to_kernels import make_setup
 from swarmscope.sim.advice import side_of_way
 from swarmscope.sim.world import WorldSpec
 from swarmscope.tasks import Setup

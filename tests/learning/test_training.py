@@ -30,8 +30,8 @@ from swarmscope.learning.evaluate import (  # noqa: E402
 from swarmscope.learning.generate import generate  # noqa: E402
 from swarmscope.learning.records import load, read_manifest, select, split_of, to_bytes, write_manifest  # noqa: E402
 from swarmscope.learning.scenes import robot  # noqa: E402
+from swarmscope.onboard.network.answering import draw  # noqa: E402
 from swarmscope.onboard.network.local_map import CELL_DISTANCE  # noqa: E402
-from swarmscope.onboard.planning._giwt import draw  # noqa: E402
 
 SMALL = {"sets": ["A-II-driven"], "channels": [4, 8, 8], "batch": 32, "threads": 2, "precision": "float32"}
 

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from swarmscope.onboard.body import Body, protection_model
-from swarmscope.onboard.perception.areas import normalise, passable_distance, quadrant_area
 from swarmscope.onboard.deciding.fields import (
     following_probability,
     fuse,
@@ -16,6 +15,7 @@ from swarmscope.onboard.deciding.fields import (
     left_probability,
     neighbour_weight,
 )
+from swarmscope.onboard.perception.areas import normalise, passable_distance, quadrant_area
 
 ALPHA_HALF = math.radians(36.0)
 TABLE_II = {

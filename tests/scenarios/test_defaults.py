@@ -11,6 +11,7 @@ from pydantic import BaseModel
 
 from swarmscope.onboard.body import Body
 from swarmscope.onboard.rig import Guarding, Safety, Sharing, make_rig
+from swarmscope.scenarios.places import make_setup
 from swarmscope.scenarios.scenario import (
     GuardModel,
     LidarModel,
@@ -24,7 +25,7 @@ from swarmscope.scenarios.scenario import (
     TaskModel,
     WorldModel,
 )
-from swarmscope.scenarios.to_kernels import make_rig_of, make_setting, make_setup
+from swarmscope.scenarios.to_kernels import make_rig_of, make_setting
 from swarmscope.sim.loop import Setting
 from swarmscope.sim.state import Noise, Radio
 

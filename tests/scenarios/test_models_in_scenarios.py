@@ -10,9 +10,11 @@ import yaml
 from giwt_models import make_model, write_card
 from swarmscope.errors import ConfigError, InputFileError
 from swarmscope.experiments.work import finished, make_job, unit_key, work, world_key
-from swarmscope.onboard.planning import giwt
+from swarmscope.onboard.planners import load_planner
+from swarmscope.scenarios import to_kernels
+from swarmscope.scenarios.places import make_setup
 from swarmscope.scenarios.read import load_scenario, parse_scenario
-from swarmscope.scenarios.to_kernels import complete, make_setting, make_setup, planner_of
+from swarmscope.scenarios.to_kernels import complete, make_setting, planner_of
 
 T1 = {"task": {"name": "T1"}, "robots": 2, "limit_s": 2.0, "record_scans": "no"}
 
@@ -23,7 +25,7 @@ def scenario_with(model, name="giwt"):
 
 def job_of(scenario):
     config = complete(scenario)
-    return make_job(unit_key(config), world_key(scenario), config, None)
+    return make_job(unit_key(scenario), world_key(scenario), config, None)
 
 
 def test_a_model_is_looked_for_beside_the_scenario_and_then_as_it_is(tmp_path, monkeypatch):
@@ -37,8 +39,8 @@ def test_a_model_is_looked_for_beside_the_scenario_and_then_as_it_is(tmp_path, m
     assert here["planner"]["model"] == str(tmp_path / "a/model")
     assert complete(parse_scenario(here, "again")) == here
     setting = make_setting(scenario, make_setup(scenario))
-    assert (setting.planner.NAME, str(setting.planner.folder)) == ("giwt", str(tmp_path / "a/model"))
-    assert planner_of(scenario.planner) is not giwt
+    assert (setting.planner.name, str(setting.planner.model.folder)) == ("giwt", str(tmp_path / "a/model"))
+    assert planner_of(scenario.planner) != load_planner("giwt")
 
 
 def test_planners_without_a_network_refuse_a_model(tmp_path):
@@ -49,22 +51,22 @@ def test_planners_without_a_network_refuse_a_model(tmp_path):
 def test_the_content_key_follows_the_model(tmp_path):
     keys = set()
     for seed in range(2):
-        keys.add(unit_key(complete(scenario_with(make_model(tmp_path / "m", seed)))))
-        keys.add(unit_key(complete(scenario_with(make_model(tmp_path / "m", seed)))))
+        keys.add(unit_key(scenario_with(make_model(tmp_path / "m", seed))))
+        keys.add(unit_key(scenario_with(make_model(tmp_path / "m", seed))))
     assert len(keys) == 2
     write_card(tmp_path / "m", accuracy=0.5)
-    assert unit_key(complete(scenario_with(tmp_path / "m"))) not in keys
+    assert unit_key(scenario_with(tmp_path / "m")) not in keys
     with pytest.raises(InputFileError, match=r"nowhere/model\.json"):
-        unit_key(complete(scenario_with(tmp_path / "nowhere")))
+        unit_key(scenario_with(tmp_path / "nowhere"))
 
 
 def test_the_key_of_a_shipped_model_is_that_of_its_card(tmp_path, monkeypatch):
-    config = complete(parse_scenario({**T1, "planner": {"name": "giwt"}}, "test"))
+    scenario = parse_scenario({**T1, "planner": {"name": "giwt"}}, "test")
     keys = []
     for seed in range(2):
-        planner = giwt.with_model(make_model(tmp_path / "shipped", seed))
-        monkeypatch.setattr(giwt, "model_state", planner.model_state)
-        keys.append(unit_key(config))
+        shipped = load_planner("giwt").with_model(make_model(tmp_path / "shipped", seed))
+        monkeypatch.setattr(to_kernels, "load_planner", {"giwt": shipped}.get)
+        keys.append(unit_key(scenario))
     assert keys[0] != keys[1]
 
 

@@ -9,12 +9,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmscope.errors import ConfigError, InputFileError, SwarmscopeError, UnknownNameError
-from swarmscope.onboard.planning.dh_bug import toss
-from swarmscope.scenarios.read import load_scenario, map_path, parse_scenario
+from swarmscope.onboard.deciding.bug import toss
+from swarmscope.scenarios.places import make_setup, map_path
+from swarmscope.scenarios.read import load_scenario, parse_scenario
 from swarmscope.scenarios.scenario import Scenario
-from swarmscope.scenarios.to_kernels import complete, make_rig_of, make_setting, make_setup, task_options
+from swarmscope.scenarios.to_kernels import complete, make_rig_of, make_setting
 from swarmscope.sim.maps import packaged_map
 from swarmscope.tasks import load_task, task_names
+from swarmscope.tasks._contract import all_options, option_fields
 
 T1 = {"task": {"name": "T1"}}
 PLACE = {
@@ -119,18 +121,18 @@ def test_a_complete_scenario_survives_yaml_and_says_everything(values):
     assert set(written) == set(Scenario.model_fields) - ({"task", "map", "place"} - set(values))
     assert set(written["planner"]["params"]) == set(make_setting_params(scenario))
     if "task" in written:
-        assert set(written["task"]["options"]) == set(task_options(load_task(scenario.task.name)))
+        assert set(written["task"]["options"]) == set(option_fields(load_task(scenario.task.name)))
 
 
 def make_setting_params(scenario):
     from swarmscope.onboard.planners import load_planner
 
-    return load_planner(scenario.planner.name).Params._fields
+    return load_planner(scenario.planner.name).defaults
 
 
 def test_options_of_every_task_can_be_given_back():
     for name in task_names():
-        options = task_options(load_task(name))
+        options = all_options(load_task(name), {})
         assert options and all(isinstance(value, float | str) for value in options.values())
         a = make_setup(parse_scenario({"task": {"name": name}, "robots": 2}, "test"))
         b = make_setup(parse_scenario({"task": {"name": name, "options": options}, "robots": 2}, "test"))
@@ -178,7 +180,7 @@ def test_settings_reach_the_kernels_in_their_units():
     assert (setting.dt, setting.limit_s, setting.seed, setting.threads) == (0.1, 12.0, 9, 2)
     rig = make_rig_of(scenario)
     assert (rig.sensor.beams, rig.sensor.range_max, rig.sensor.wraps) == (90, 8.0, False)
-    assert (rig.body.radius_m, rig.body.v_max_mps, rig.clearance) == (0.2, 0.4, 0.05)
+    assert (rig.body.radius_m, rig.body.v_max_mps, rig.guarding.clearance_m) == (0.2, 0.4, 0.05)
 
 
 @pytest.mark.parametrize(("robots", "choice", "kept"), [(2, "auto", True), (2000, "auto", False), (2, "no", False)])

@@ -14,7 +14,7 @@ places = st.lists(st.tuples(st.floats(-14.0, 14.0), st.floats(-14.0, 14.0)), min
 
 
 def indexed(points):
-    sim, _, _ = place_sim([(x, y, 0.0) for x, y in points])
+    sim, _ = place_sim([(x, y, 0.0) for x, y in points])
     index_robots(sim)
     return sim
 

@@ -31,7 +31,7 @@ def pose(sim, i=0):
 
 
 def at_speed(v, start=(0.0, 0.0, 0.0), **options):
-    sim, _, _ = place_sim([start], **options)
+    sim, _ = place_sim([start], **options)
     sim.robots["v"] = v
     return sim
 
@@ -126,7 +126,7 @@ def test_clearance_is_measured_along_the_way():
 
 
 def test_two_robots_that_meet_both_stop():
-    sim, _, _ = place_sim([(-0.5, 0.0, 0.0), (0.5, 0.02, math.pi), (5.0, 5.0, 0.0)])
+    sim, _ = place_sim([(-0.5, 0.0, 0.0), (0.5, 0.02, math.pi), (5.0, 5.0, 0.0)])
     drive(sim, [(0.5, 0.0)] * 3, 10)
     assert sim.robots["crashed"].tolist() == [1, 1, 0]
     assert sim.robots["v"][:2].tolist() == [0.0, 0.0]
@@ -137,7 +137,7 @@ def test_two_robots_that_meet_both_stop():
 
 def test_fast_robots_do_not_pass_through_each_other():
     rig = rig_of(Body(v_max_mps=30.0, a_max_mps2=1e4, half_width_m=0.1))
-    sim, _, _ = place_sim([(-3.0, 0.0, 0.0), (3.0, 0.1, math.pi)], rig=rig)
+    sim, _ = place_sim([(-3.0, 0.0, 0.0), (3.0, 0.1, math.pi)], rig=rig)
     sim.robots["v"] = 30.0
     drive(sim, [(30.0, 0.0)] * 2, 1)
     assert sim.robots["crashed"].tolist() == [1, 1]
@@ -145,7 +145,7 @@ def test_fast_robots_do_not_pass_through_each_other():
 
 
 def test_robots_that_pass_closely_do_not_crash_and_know_how_closely():
-    sim, _, _ = place_sim([(-1.0, 0.0, 0.0), (1.0, 0.35, math.pi)])
+    sim, _ = place_sim([(-1.0, 0.0, 0.0), (1.0, 0.35, math.pi)])
     drive(sim, [(0.5, 0.0)] * 2, 20)
     assert sim.robots["crashed"].tolist() == [0, 0]
     assert sim.robots["min_clearance"] == pytest.approx([0.05, 0.05], abs=1e-3)

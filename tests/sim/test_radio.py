@@ -16,7 +16,7 @@ REQUEST, FEATURES = 7, 26
 
 
 def line(robots=2, gap=1.0, **radio):
-    sim, _, _ = place_sim([(gap * k, 0.0, 0.0) for k in range(robots)], radio=Radio(**radio))
+    sim, _ = place_sim([(gap * k, 0.0, 0.0) for k in range(robots)], radio=Radio(**radio))
     index_robots(sim)
     return sim
 

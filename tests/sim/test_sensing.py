@@ -19,7 +19,7 @@ NOISE = Noise(range_fraction=0.02, dropout=0.05, bearing_rad=0.02, compass_rad=0
 
 
 def sensed(starts, tick=3, **options):
-    sim, _, _ = place_sim(starts, **options)
+    sim, _ = place_sim(starts, **options)
     index_robots(sim)
     sense(sim, tick, 0, len(starts))
     return sim
@@ -98,7 +98,7 @@ def test_the_goal_is_given_in_the_body_frame():
 
 
 def test_odometry_is_the_motion_since_the_last_tick_in_the_old_body_frame():
-    sim, _, _ = place_sim([(1.0, 2.0, 0.5 * math.pi)])
+    sim, _ = place_sim([(1.0, 2.0, 0.5 * math.pi)])
     index_robots(sim)
     sense(sim, 0, 0, 1)
     assert [float(sim.percepts[0][k]) for k in ("odom_x", "odom_y", "odom_yaw")] == pytest.approx(
@@ -146,7 +146,7 @@ def test_noise_is_the_same_for_the_same_seed_and_tick_only():
 
 def test_noise_does_not_depend_on_the_order_in_which_robots_are_sensed():
     a = noisy()
-    sim, _, _ = place_sim(
+    sim, _ = place_sim(
         [(0.0, 0.0, 0.0), (2.0, 0.0, 0.0), (0.0, 1.5, 0.0)],
         noise=NOISE,
         world=circles_world([(-2.0, 0.0, 0.5)]),
@@ -161,7 +161,7 @@ def test_noise_does_not_depend_on_the_order_in_which_robots_are_sensed():
 
 def test_noise_has_the_size_that_is_asked_for():
     starts = [(0.0, 0.0, 0.0), (2.0, 0.0, 0.0)]
-    sim, _, _ = place_sim(starts, noise=Noise(0.03, 0.0, 0.04, 0.05))
+    sim, _ = place_sim(starts, noise=Noise(0.03, 0.0, 0.04, 0.05))
     index_robots(sim)
     rows = []
     for tick in range(2000):
@@ -193,7 +193,7 @@ def test_returns_below_range_min_are_invalid():
 
 
 def test_packets_are_handed_over_when_due_oldest_first_and_the_rest_waits():
-    sim, _, _ = place_sim([(0.0, 0.0, 0.0)])
+    sim, _ = place_sim([(0.0, 0.0, 0.0)])
     index_robots(sim)
     count = MAX_INBOX + 3
     for q in range(count):

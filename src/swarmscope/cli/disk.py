@@ -20,6 +20,7 @@ from swarmscope.cli._console import PlainConsole
 from swarmscope.disk import controllers, maps, user
 from swarmscope.disk.bounds import bound
 from swarmscope.disk.check import check
+from swarmscope.disk.find_map import find_map, seed_of
 from swarmscope.disk.random_maps import RandomCase, random_map
 from swarmscope.disk.rules import Rules, all_permutations, read_permutation, scaled
 from swarmscope.disk.runs import Film, Problem, problem
@@ -86,7 +87,7 @@ def table_command(
     choices = read_choices(names)
     rules = Rules()
     chosen = [read_permutation(text, rules.n) for text in permutations] or list(all_permutations(rules.n))
-    of = problem(rules, [maps.find_map(name, rules) for name in map_names or maps.REPORT_MAPS], chosen)
+    of = problem(rules, [find_map(name, rules) for name in map_names or maps.REPORT_MAPS], chosen)
     twice = first_twice([one.name for one in of.maps])
     if twice is not None:
         raise ConfigError(twice, "two maps have this name; name each once, and give files different names")
@@ -195,11 +196,11 @@ def one_problem(map_: str, permutation: str | None, robots: int | None, radius: 
     """Return the problem of one run. Errors: those of maps, rules and permutations, and of runs that cannot end."""
     n = robots or Rules().n
     rules = scaled(n) if radius is None else scaled(n, r=radius)
-    place, chosen = maps.find_map(map_, rules), tuple(range(n))
+    place, chosen = find_map(map_, rules), tuple(range(n))
     if permutation is not None:
         chosen = read_permutation(permutation, n)
     elif map_.startswith("random:"):
-        chosen = random_map(maps.seed_of(map_), rules).permutation
+        chosen = random_map(seed_of(map_), rules).permutation
     of = problem(rules, [place], [chosen])
     check(of)
     return of

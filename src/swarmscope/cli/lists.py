@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from rich.table import Table
 
+from swarmscope.bounds import Value, about
 from swarmscope.cli._console import PlainConsole
 from swarmscope.onboard.planners import load_planner, planner_names
 from swarmscope.scenarios.keys import docs_of
-from swarmscope.scenarios.to_kernels import task_options
 from swarmscope.tasks import load_task, task_names
-from swarmscope.tasks._contract import Option
+from swarmscope.tasks._contract import all_options
 
 
 def list_planners() -> None:
@@ -19,10 +19,10 @@ def list_planners() -> None:
         planner = load_planner(name)
         console.print(f"[bold]{name}[/bold]  {planner.summary.removeprefix(f'{name}: ')}")
         console.print(f"  is given: {planner.needs}", highlight=False)
-        table = Table("planner.params", "default", "bounds", "meaning")
+        table = Table("planner.params", "default", "takes", "meaning")
         docs = docs_of(planner.params_type)
-        for field, default in planner.defaults.items():
-            table.add_row(field, str(default), planner.bounds(field), docs.get(field, ""))
+        for field in planner.fields.values():
+            table.add_row(field.name, str(field.default), about(field), docs.get(field.name, ""))
         console.print(table)
 
 
@@ -31,11 +31,11 @@ def list_tasks() -> None:
     table = Table("task", "what it is", "task.options and defaults")
     for name in task_names():
         task = load_task(name)
-        options = " ".join(f"{key}={_short(value)}" for key, value in task_options(task).items())
+        options = " ".join(f"{key}={_short(value)}" for key, value in all_options(task, {}).items())
         table.add_row(name, task.SUMMARY, options)
     PlainConsole().print(table)
     print("Example of an option: swarmscope run --task T1 --set task.options.density=0.2")
 
 
-def _short(value: Option) -> str:
+def _short(value: Value) -> str:
     return value if isinstance(value, str) else f"{value:g}"

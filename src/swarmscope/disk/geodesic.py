@@ -7,6 +7,12 @@ it is to a goal and which way to go, in well under a microsecond for a handful o
 
 A *slot* is one way round a disc: ``2 * disc`` counter-clockwise, ``2 * disc + 1`` clockwise. A *node* is the point
 where a free tangent to another disc leaves a slot; nodes of a slot are sorted in the sense of travel.
+
+A start or a goal may lie inside discs: who stands a rounding error too deep, or in a margin that is used up, can
+still leave, and who is to go there still arrives. Both ends are treated alike, so a way is as long there as back.
+While a way is straight towards or from an end, a disc that holds this end counts as shrunk until it touches it. A
+way that goes round the disc itself begins or ends beside the point on its rim, and the distance between the two is
+not counted: such a way may be shorter than the straight line by the depths of its ends.
 """
 
 from __future__ import annotations
@@ -59,6 +65,10 @@ class Ways(NamedTuple):
     last_angle: Floats
     """Angle at which the tangent to the goal leaves a slot, NaN where none is free."""
     last_length: Floats
+    last_clear: Floats
+    """How far [rad] before ``last_angle`` one may have entered what bars the slot: above 0 for goals in discs only."""
+    goal_depth: Floats
+    """(fields,): how deep a goal lies in a disc at most."""
 
 
 @jit_inline
@@ -75,6 +85,19 @@ def segment_is_free(ways: Ways, which: int, ax: float, ay: float, bx: float, by:
         px, py = ax - x, ay - y
         rho = min(rho, math.sqrt(px * px + py * py)) - TOUCH
         if nearest_on_the_way(px, py, bx - x, by - y) < rho:
+            return False
+    return True
+
+
+@jit_inline
+def _ends_see_each_other(ways: Ways, which: int, ax: float, ay: float, bx: float, by: float) -> bool:
+    """Return whether the straight way from a start to a goal passes all discs, those that hold an end shrunk."""
+    for c in range(ways.disc_start[which], ways.disc_start[which + 1]):
+        px, py = ax - ways.disc[c, 0], ay - ways.disc[c, 1]
+        qx, qy = bx - ways.disc[c, 0], by - ways.disc[c, 1]
+        near = nearest_on_the_way(px, py, qx, qy)
+        rho = min(ways.disc[c, 2], math.sqrt(px * px + py * py))
+        if near < rho - TOUCH and near < math.sqrt(qx * qx + qy * qy) - TOUCH:
             return False
     return True
 
@@ -97,17 +120,27 @@ def _turn(slot: int, start: float, end: float) -> float:
 
 
 @jit_inner
+def _by_last_tangent(ways: Ways, field: int, slot: int, angle: float, clear: float) -> tuple[float, float]:
+    """Return the cost for who goes along ``slot`` until the tangent to the goal, and how far that is [rad].
+
+    ``clear`` is how far one can go [rad]. Cost infinity if there is no tangent or one cannot go that far.
+    """
+    local = slot - 2 * ways.disc_start[ways.field_map[field]] + ways.field_slot[field]
+    if ways.last_angle[local] != ways.last_angle[local]:
+        return math.inf, 0.0
+    turn = _turn(slot, angle, ways.last_angle[local])
+    if turn > clear + ways.last_clear[local]:
+        return math.inf, turn
+    return turn * ways.disc[slot // 2, 2] + ways.last_length[local], turn
+
+
+@jit_inner
 def _along_slot(ways: Ways, field: int, slot: int, angle: float) -> float:
     """Return the cost to the goal for who arrives on ``slot`` at ``angle``, infinity if there is no way on."""
     which = ways.field_map[field]
     rho = ways.disc[slot // 2, 2]
     clear = _clear_run(ways, slot, angle) + 1e-9
-    least = math.inf
-    local = slot - 2 * ways.disc_start[which] + ways.field_slot[field]
-    if ways.last_angle[local] == ways.last_angle[local]:
-        turn = _turn(slot, angle, ways.last_angle[local])
-        if turn <= clear:
-            least = turn * rho + ways.last_length[local]
+    least, _ = _by_last_tangent(ways, field, slot, angle, clear)
     first, end = ways.slot_start[slot], ways.slot_start[slot + 1]
     if end > first:
         node = _next_node(ways, slot, angle)
@@ -135,13 +168,13 @@ def look_up(ways: Ways, field: int, x: float, y: float) -> tuple[float, float, f
     """Return the length of the shortest way from a point to a goal, its first direction, and the slot it makes for.
 
     The direction is a unit vector; the slot is -1 on the straight way to the goal. Length infinity and direction
-    0 where there is no way.
+    0 where there is no way. The point and the goal may lie in discs (see the top of this file).
     """
     which = ways.field_map[field]
     gx, gy = ways.field_goal[field, 0], ways.field_goal[field, 1]
     ux, uy = gx - x, gy - y
     straight = math.sqrt(ux * ux + uy * uy)
-    if segment_is_free(ways, which, x, y, gx, gy, -1, -1):
+    if _ends_see_each_other(ways, which, x, y, gx, gy):
         if straight == 0.0:
             return 0.0, 0.0, 0.0, -1
         return straight, ux / straight, uy / straight, -1
@@ -153,9 +186,10 @@ def look_up(ways: Ways, field: int, x: float, y: float) -> tuple[float, float, f
         length = math.sqrt(max(0.0, apart * apart - rho * rho))
         if length >= least or apart == 0.0:
             continue
+        not_counted = (ways.disc[c, 2] - rho) + ways.goal_depth[field]
         for side in range(2):
             cost, tx, ty = _by_tangent(
-                ways, field, 2 * c + side, x, y, px / apart, py / apart, rho / apart, length, least
+                ways, field, 2 * c + side, x, y, px / apart, py / apart, rho / apart, length, least + not_counted
             )
             if cost < least:
                 least, dx, dy, chosen = cost, tx, ty, 2 * c + side
@@ -186,10 +220,7 @@ def _by_tangent(
 
     Infinity for a way that is not free, or cannot be shorter than ``known``.
     """
-    sense = 1.0 if slot % 2 == 0 else -1.0
-    cosine = math.sqrt(max(0.0, 1.0 - sine * sine))
-    # With the disc on the left (counter-clockwise) one passes it on the right of the line to its centre.
-    dx, dy = px * cosine + py * sine * sense, py * cosine - px * sine * sense
+    dx, dy = _towards(slot, px, py, sine)
     ex, ey = x + dx * length, y + dy * length
     if ex * ex + ey * ey > 1.0 + 3.0 * ROUNDING:
         return math.inf, dx, dy
@@ -203,6 +234,18 @@ def _by_tangent(
         return math.inf, dx, dy
     angle = positive_angle(math.atan2(ey - ways.disc[c, 1], ex - ways.disc[c, 0]))
     return length + _along_slot(ways, field, slot, angle), dx, dy
+
+
+@jit_inner
+def _towards(slot: int, px: float, py: float, sine: float) -> tuple[float, float]:
+    """Return the direction in which one makes for ``slot``; p is the unit vector to the disc's centre.
+
+    ``sine`` is that of the angle between the two.
+    """
+    sense = 1.0 if slot % 2 == 0 else -1.0
+    cosine = math.sqrt(max(0.0, 1.0 - sine * sine))
+    # With the disc on the left (counter-clockwise) one passes it on the right of the line to its centre.
+    return px * cosine + py * sine * sense, py * cosine - px * sine * sense
 
 
 @jit_inner
@@ -322,6 +365,8 @@ def build(maps: Sequence[Floats], margins: Sequence[float] | float) -> Ways:
         cost=no_floats,
         last_angle=no_floats,
         last_length=no_floats,
+        last_clear=no_floats,
+        goal_depth=no_floats,
     )
 
 
@@ -356,6 +401,8 @@ def add_goals(ways: Ways, which: Ints, goals: Floats) -> Ways:
         cost=np.full(int(nodes.sum()), np.inf),
         last_angle=np.full(int(slots.sum()), np.nan),
         last_length=np.full(int(slots.sum()), np.nan),
+        last_clear=np.zeros(int(slots.sum())),
+        goal_depth=np.zeros(len(which)),
     )
     for field in range(len(which)):
         _fill(full, field)
@@ -367,6 +414,7 @@ def _fill(ways: Ways, field: int) -> None:
     """Compute the costs of one goal: backwards from it, until no tangent gets better."""
     which = ways.field_map[field]
     first_slot = 2 * ways.disc_start[which]
+    ways.goal_depth[field] = _depth(ways, which, ways.field_goal[field, 0], ways.field_goal[field, 1], -1)
     for slot in range(first_slot, 2 * ways.disc_start[which + 1]):
         _last_tangent(ways, field, slot, ways.field_slot[field] + slot - first_slot)
     offset = ways.field_node[field] - ways.slot_start[first_slot]
@@ -389,12 +437,7 @@ def _further(ways: Ways, field: int, slot: int, node: int) -> float:
     which = ways.field_map[field]
     rho, angle = ways.disc[slot // 2, 2], ways.node_angle[node]
     clear = _clear_run(ways, slot, angle) + 1e-9
-    least = math.inf
-    local = slot - 2 * ways.disc_start[which] + ways.field_slot[field]
-    if ways.last_angle[local] == ways.last_angle[local]:
-        turn = _turn(slot, angle, ways.last_angle[local])
-        if turn <= clear:
-            least = turn * rho + ways.last_length[local]
+    least, _ = _by_last_tangent(ways, field, slot, angle, clear)
     first, end = ways.slot_start[slot], ways.slot_start[slot + 1]
     if end - first > 1:
         following = node + 1 if node + 1 < end else first
@@ -408,22 +451,46 @@ def _further(ways: Ways, field: int, slot: int, node: int) -> float:
 @jit_inner
 def _last_tangent(ways: Ways, field: int, slot: int, local: int) -> None:
     """Note where the tangent to the goal leaves a slot, if it is free."""
-    c = slot // 2
+    c, which = slot // 2, ways.field_map[field]
+    x, y = ways.disc[c, 0], ways.disc[c, 1]
     gx, gy = ways.field_goal[field, 0], ways.field_goal[field, 1]
-    px, py = gx - ways.disc[c, 0], gy - ways.disc[c, 1]
+    px, py = gx - x, gy - y
     apart = math.sqrt(px * px + py * py)
-    if apart < ways.disc[c, 2]:
+    if apart == 0.0:
         return
+    rho = min(ways.disc[c, 2], apart)
     # Seen from the centre the tangent point lies that far before the goal, in the sense of travel.
-    before = math.acos(ways.disc[c, 2] / apart)
+    before = math.acos(rho / apart)
     angle = math.atan2(py, px) - before if slot % 2 == 0 else math.atan2(py, px) + before
-    ex, ey = ways.disc[c, 0] + ways.disc[c, 2] * math.cos(angle), ways.disc[c, 1] + ways.disc[c, 2] * math.sin(angle)
+    cosine, sine = math.cos(angle), math.sin(angle)
+    ex, ey = x + rho * cosine, y + rho * sine
     if ex * ex + ey * ey > 1.0 + 3.0 * ROUNDING:
         return
     # From the goal, which may lie deep in a margin, back to the disc.
-    if segment_is_free(ways, ways.field_map[field], gx, gy, ex, ey, c, -1):
-        ways.last_angle[local] = positive_angle(angle)
-        ways.last_length[local] = math.sqrt(max(0.0, apart * apart - ways.disc[c, 2] ** 2))
+    if not segment_is_free(ways, which, gx, gy, ex, ey, c, -1):
+        return
+    length = math.sqrt(max(0.0, apart * apart - rho * rho))
+    back = slot + 1 - 2 * (slot % 2)
+    dx, dy = _towards(back, -px / apart, -py / apart, rho / apart)
+    if length < TOUCH and _leads_into_another(ways, which, gx, gy, dx, dy, c):
+        return
+    ways.last_angle[local] = positive_angle(angle)
+    ways.last_length[local] = length
+    rim_x, rim_y = x + ways.disc[c, 2] * cosine, y + ways.disc[c, 2] * sine
+    if rim_x * rim_x + rim_y * rim_y > 1.0 + 3.0 * ROUNDING or _depth(ways, which, rim_x, rim_y, c) > TOUCH:
+        # What one enters on the way to it holds the goal: as on the way back, only what is passed wholly bars.
+        ways.last_clear[local] = _clear_run(ways, back, ways.last_angle[local])
+
+
+@jit_inner
+def _depth(ways: Ways, which: int, x: float, y: float, own: int) -> float:
+    """Return how deep a point lies in a disc of map ``which`` other than ``own`` at most, 0 if in none."""
+    deepest = 0.0
+    for c in range(ways.disc_start[which], ways.disc_start[which + 1]):
+        px, py = x - ways.disc[c, 0], y - ways.disc[c, 1]
+        if c != own:
+            deepest = max(deepest, ways.disc[c, 2] - math.sqrt(px * px + py * py))
+    return deepest
 
 
 @jit

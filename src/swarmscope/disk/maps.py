@@ -1,4 +1,4 @@
-"""Obstacle maps of the unit disk: the five of the report by name, random ones, and files of users."""
+"""Obstacle maps of the unit disk: the five of the report by name, and files of users."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import yaml
 
-from swarmscope.disk.rules import Floats, Rules
-from swarmscope.errors import ConfigError, InputFileError, UnknownNameError
+from swarmscope.disk.rules import Floats
+from swarmscope.errors import InputFileError
 
 MOST_OBSTACLES = 200
 FARTHEST = 100.0
@@ -65,30 +65,6 @@ REPORT_MAPS = {
 
 EMPTY = _map("empty", "no obstacle")
 NAMED = REPORT_MAPS | {EMPTY.name: EMPTY}
-
-
-def find_map(name: str, rules: Rules) -> DiskMap:
-    """Return the map of that name, 'random:SEED' for robots of these rules, or the one in that YAML file.
-
-    Errors: UnknownNameError, InputFileError, ConfigError.
-    """
-    if name in NAMED:
-        return NAMED[name]
-    if name.startswith("random:"):
-        from swarmscope.disk.random_maps import random_map
-
-        return random_map(seed_of(name), rules).map
-    if Path(name).suffix in {".yaml", ".yml", ".json"}:
-        return read_map(Path(name))
-    raise UnknownNameError("map", name, [*NAMED, "random:SEED", "FILE.yaml"])
-
-
-def seed_of(name: str) -> int:
-    """Return the seed in 'random:SEED'."""
-    text = name.partition(":")[2]
-    if not text.isdecimal():
-        raise ConfigError(name, "the seed of a random map is a whole number, as in random:7")
-    return int(text)
 
 
 def read_map(path: Path) -> DiskMap:

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import inspect
 import time
-import traceback
 from collections.abc import Callable
 from pathlib import Path
 from types import CodeType
@@ -21,6 +20,7 @@ import numpy as np
 from swarmscope.disk.rules import Floats, Ints
 from swarmscope.disk.runs import Problem
 from swarmscope.errors import InputFileError, SwarmscopeError
+from swarmscope.user_files import RAISED, compiled, one_line, raised
 
 FUNCTION = "compute_gradients"
 HUGE = 1e100
@@ -76,7 +76,7 @@ class UserController:
             begun = time.perf_counter()
             try:
                 answer = self._functions[b](*given)
-            except (Exception, SystemExit, GeneratorExit) as error:
+            except RAISED as error:
                 raise UserControllerError(f"{self._where(b, step)}: {raised(error, self._path)}") from None
             self.calls += 1
             self.seconds += time.perf_counter() - begun
@@ -115,24 +115,12 @@ class UserController:
         return f"{self._path}: {FUNCTION} in step {step} of map {name}, permutation {permutation}"
 
 
-def compiled(path: Path) -> CodeType:
-    """Return the code of a file. Errors: InputFileError if it cannot be read or is not Python."""
-    try:
-        return compile(path.read_bytes(), str(path), "exec")
-    except OSError as error:
-        raise InputFileError(path, error.strerror or "cannot be read") from None
-    except SyntaxError as error:
-        raise InputFileError(path, f"is not Python: line {error.lineno}: {error.msg}") from None
-    except (ValueError, RecursionError, MemoryError) as error:
-        raise InputFileError(path, f"is not Python: {error}") from None
-
-
 def function_of(path: Path, code: CodeType) -> Callable[..., Any]:
     """Run a file and return its function. Errors: InputFileError."""
     space: dict[str, Any] = {"__name__": path.stem, "__file__": str(path)}
     try:
         exec(code, space)  # noqa: S102 - running the user's own file is what the user asked for
-    except (Exception, SystemExit, GeneratorExit) as error:
+    except RAISED as error:
         raise InputFileError(path, raised(error, path)) from None
     function: Callable[..., Any] | None = space.get(FUNCTION)
     if function is None or not callable(function):
@@ -145,19 +133,6 @@ def function_of(path: Path, code: CodeType) -> Callable[..., Any]:
     except ValueError:
         pass  # built-in functions may have no signature
     return function
-
-
-def raised(error: BaseException, path: Path) -> str:
-    """Return what was raised, and in which line of the user's file."""
-    lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
-    place = f" in line {lines[-1]}" if lines else ""
-    message = one_line(error)
-    return f"raised {type(error).__name__}{place}{': ' if message else ''}{message}"
-
-
-def one_line(error: BaseException) -> str:
-    """Return the message of an error in one line."""
-    return " ".join(str(error).split())
 
 
 def write_starter(path: Path) -> Path:

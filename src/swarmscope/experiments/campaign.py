@@ -41,7 +41,7 @@ def keyed_units(experiment: Experiment, maps: int | None = None) -> list[Keyed]:
     found: list[Keyed] = []
     for unit in units(experiment, maps):
         try:
-            found.append((unit, unit_key(complete(unit.scenario))))
+            found.append((unit, unit_key(unit.scenario)))
         except InputFileError as error:
             raise ConfigError(f"{experiment.name}: planner '{unit.planner}'", f"has no model to run: {error}") from None
     return found

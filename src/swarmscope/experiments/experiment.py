@@ -17,7 +17,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from swarmscope.errors import ConfigError, InputFileError, UnknownNameError, nearest_hint
 from swarmscope.experiments.seeds import seed_set
 from swarmscope.judging.metrics import BETWEEN, COUNTED, METRICS
-from swarmscope.scenarios.read import parse_scenario
+from swarmscope.scenarios.read import find_user_files, parse_scenario
 from swarmscope.scenarios.scenario import Scenario
 
 Name = Annotated[str, Field(min_length=1, max_length=60, pattern=r"^[^/\\\n]+$")]
@@ -182,7 +182,20 @@ def load_experiment(path: Path) -> Experiment:
         raise InputFileError(path, f"cannot be read ({error.strerror})") from None
     except (yaml.YAMLError, ValueError, RecursionError) as error:
         raise InputFileError(path, f"is not YAML ({' '.join(str(error).split())})") from None
+    if isinstance(values, dict):
+        for keys in _scenarios_in(values):
+            find_user_files(keys, path.parent)
     return parse_experiment(values, str(path))
+
+
+def _scenarios_in(values: Keys) -> list[Keys]:
+    """Return the keys of scenarios in an experiment that is not checked yet."""
+    groups = [values.get("scenario"), *_values_of(values.get("places")), *_values_of(values.get("planners"))]
+    return [keys for keys in groups if isinstance(keys, dict)]
+
+
+def _values_of(group: Any) -> list[Any]:
+    return list(group.values()) if isinstance(group, dict) else []
 
 
 def parse_experiment(values: Any, where: str) -> Experiment:

@@ -1,7 +1,8 @@
 """One run as a unit of work: text in, text out, the same on every machine.
 
-The *content key* of a unit is a hash of its complete scenario and of the state of the code that can change a
-result, so a finished unit never has to be run again, and a changed program never passes old results off as its own.
+The *content key* of a unit is a hash of its scenario and of the state of the code that can change its result, so a
+finished unit never has to be run again, and a changed program never passes old results off as its own. That code is
+what this module, the unit's planner and its task import: another planner, a page or a command is no part of it.
 """
 
 from __future__ import annotations
@@ -10,22 +11,30 @@ import hashlib
 import json
 import math
 import traceback
-from functools import lru_cache
+from collections.abc import Mapping
+from functools import cache, lru_cache
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from swarmscope.closure import closure_of, closure_state, libraries_of, state_of, union_of
 from swarmscope.errors import SwarmscopeError
+from swarmscope.judging import references
 from swarmscope.judging.cases import find_cases
-from swarmscope.judging.provenance import PACKAGE, git_revision, installed_version, versions
-from swarmscope.judging.run import Outcome, References, figures, play
+from swarmscope.judging.provenance import git_revision, installed_version, library_version, versions
+from swarmscope.judging.references import References
+from swarmscope.judging.run import Outcome, figures, play
+from swarmscope.onboard.planners import planner_file
+from swarmscope.scenarios import places
 from swarmscope.scenarios.read import parse_scenario
 from swarmscope.scenarios.scenario import PlannerModel, Scenario
-from swarmscope.scenarios.to_kernels import planner_of
+from swarmscope.scenarios.to_kernels import complete, planner_of
+from swarmscope.tasks import task_file
+from swarmscope.user_files import is_file_name
 
 MEASURED = ("plan_us_p50", "plan_us_p99", "run_wall_s", "reference_s")
 """Figures that are times of this machine: stored, but no part of the digest."""
-NO_RESULT = frozenset({"api.py", "cli", "viewing", "experiments"})
 LENGTHS = ("shortest_m", "any_angle_m")
 PLACE_KEYS = ("task", "map", "place", "robots", "seed")
 
@@ -48,15 +57,34 @@ class Finished(NamedTuple):
     """Why there is no result; then everything but key, world and config is empty."""
 
 
-@lru_cache(maxsize=1)
-def code_state() -> str:
-    """Return a hash of the sources that can change a result, and of the versions of numpy and numba."""
-    state = hashlib.sha256(json.dumps({k: v for k, v in versions().items() if k != "swarmscope"}).encode())
-    for file in sorted(PACKAGE.rglob("*.py")):
-        part, *_ = file.relative_to(PACKAGE).parts
-        if part not in NO_RESULT:
-            state.update(file.relative_to(PACKAGE).as_posix().encode() + file.read_bytes())
-    return state.hexdigest()[:16]
+def code_state(config: Mapping[str, Any]) -> str:
+    """Return a hash of the code that can change the result of a scenario, and of the versions that it depends on."""
+    names = _name_of("planner", config), _name_of("task", config)
+    edited = tuple(closure_state(Path(name)) for name in names if name is not None and is_file_name(name))
+    return _code_state(*names, edited)
+
+
+def _name_of(group: str, config: Mapping[str, Any]) -> str | None:
+    chosen = config.get(group) or {}
+    default = PlannerModel().name if group == "planner" else None
+    name: str | None = chosen.get("name", default)
+    return name
+
+
+@cache
+def _code_state(planner: str | None, task: str | None, edited: tuple[str, ...]) -> str:
+    """``edited`` are the states of users' files, which may change while this runs."""
+    members = code_files(planner, task)
+    ours = closure_of(Path(__file__))
+    libraries = sorted({*libraries_of(union_of(members))} - {*libraries_of(ours)})
+    known = {name: version for name, version in versions().items() if name != "swarmscope"}
+    known |= {name: library_version(name) for name in libraries}
+    return _hash({"code": state_of({*ours, *union_of(members)}), "versions": known})[:16]
+
+
+def code_files(planner: str | None, task: str | None) -> list[Path]:
+    """Return the files of a planner and a task, where they are given."""
+    return ([planner_file(planner)] if planner else []) + ([task_file(task)] if task else [])
 
 
 @lru_cache(maxsize=1)
@@ -71,21 +99,37 @@ def model_state(config: dict[str, Any]) -> str | None:
     return None if model is None else f"{model.state()} onnxruntime {installed_version('onnxruntime')}"
 
 
-def unit_key(config: dict[str, Any]) -> str:
-    """Return the content key of a complete scenario."""
+def unit_key(scenario: Scenario) -> str:
+    """Return the content key of a scenario; no user's file is run for it, and where it lies does not count."""
+    config = complete(scenario, run_files=False)
     model = model_state(config)
-    return _hash({"config": config, "code": code_state()} | ({} if model is None else {"model": model}))
+    values = {"config": _without_folders(config), "code": code_state(config)}
+    return _hash(values | ({} if model is None else {"model": model}))
 
 
 def world_key(scenario: Scenario) -> str:
     """Return the content key of the world, starts and goals of a scenario: what its reference ways depend on."""
     config = scenario.model_dump(mode="json", include=set(PLACE_KEYS), exclude_none=True)
-    return _hash({"place": config, "radius": scenario.robot.radius_m, "code": code_state()})
+    task = code_files(None, _name_of("task", config))
+    code = state_of(union_of([Path(str(places.__file__)), Path(str(references.__file__)), *task]))
+    numbers = {name: installed_version(name) for name in ("numpy", "numba")}
+    values = {"place": _without_folders(config), "radius": scenario.robot.radius_m, "code": code}
+    return _hash(values | {"versions": numbers})
+
+
+def _without_folders(config: dict[str, Any]) -> dict[str, Any]:
+    """Return a scenario in which users' files stand without their folders: what they say is part of the code."""
+    short = {}
+    for group in ("planner", "task"):
+        name = _name_of(group, config)
+        if group in config and name is not None and is_file_name(name):
+            short[group] = config[group] | {"name": Path(name).name}
+    return config | short
 
 
 def make_job(key: str, world: str, config: dict[str, Any], references: dict[str, Any] | None) -> str:
     """Return a unit as text; ``references`` as an earlier run in the same world returned them."""
-    job = {"key": key, "world": world, "config": config, "references": references, "code": code_state()}
+    job = {"key": key, "world": world, "config": config, "references": references, "code": code_state(config)}
     job["model"] = model_state(config)
     return json.dumps(job)
 
@@ -94,7 +138,7 @@ def work(job: str) -> str:
     """Run a unit; whatever goes wrong in it becomes its error."""
     asked = json.loads(job)
     try:
-        if asked["code"] != code_state():
+        if asked["code"] != code_state(asked["config"]):
             raise SwarmscopeError("this machine has another version of swarmscope, numpy or numba than the one asking")
         if asked.get("model") != model_state(asked["config"]):
             raise SwarmscopeError("the planner's network is another one here than where the run was asked for")
@@ -129,7 +173,7 @@ def _run(asked: dict[str, Any]) -> dict[str, Any]:
         "failures": values["failures"],
         "cases": find_cases(outcome.trace.choices, outcome.setting.dt),
     }
-    about = {"git": revision(), "code": code_state()} | versions()
+    about = {"git": revision(), "code": code_state(asked["config"])} | versions()
     references = {
         "shortest_m": _list(outcome.references.shortest_m),
         "any_angle_m": _list(outcome.references.any_angle_m),

@@ -6,18 +6,19 @@ import importlib.metadata
 import os
 import platform
 import subprocess
+from functools import cache
 from pathlib import Path
 
-import swarmscope
+from swarmscope import __version__, closure
 
-PACKAGE = Path(swarmscope.__file__).resolve().parent
+PACKAGE = Path(closure.PACKAGE)
 GIT_SECONDS = 10.0
 
 
 def versions() -> dict[str, str]:
     """Return the versions that can change a result, without importing the packages."""
     return {
-        "swarmscope": swarmscope.__version__,
+        "swarmscope": __version__,
         "python": platform.python_version(),
         "numpy": installed_version("numpy"),
         "numba": installed_version("numba"),
@@ -45,6 +46,16 @@ def installed_version(package: str) -> str:
         return importlib.metadata.version(package)
     except importlib.metadata.PackageNotFoundError:
         return "unknown"
+
+
+@cache
+def library_version(module: str) -> str:
+    """Return the version of the package that a top-level module belongs to, which may be called otherwise."""
+    version = installed_version(module)
+    if version != "unknown":
+        return version
+    packages = sorted(importlib.metadata.packages_distributions().get(module, []))
+    return " ".join(f"{package} {installed_version(package)}" for package in packages) or "unknown"
 
 
 def _git(folder: Path, *arguments: str) -> str:

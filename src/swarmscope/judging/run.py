@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -23,34 +22,20 @@ from swarmscope.judging.metrics import (
     sides_judged,
 )
 from swarmscope.judging.provenance import git_revision, versions
+from swarmscope.judging.references import References, reference_ways
 from swarmscope.judging.run_folder import check_out, write_run
-from swarmscope.judging.shortest_path import any_angle_paths, grid_paths, lengths_m
 from swarmscope.judging.sides import judged_by, make_advice
 from swarmscope.onboard.planners import Planner
 from swarmscope.onboard.reasons import STATE_NAMES
+from swarmscope.scenarios.places import make_setup
 from swarmscope.scenarios.scenario import Scenario
-from swarmscope.scenarios.to_kernels import complete, make_setting, make_setup
+from swarmscope.scenarios.to_kernels import complete, make_setting
 from swarmscope.sim.loop import Setting, Trace, run
 from swarmscope.tasks import Setup
 
-ANY_ANGLE_ROBOTS = 50
-"""With more robots the any-angle reference, which takes longer than the run, is left out."""
 ARRIVE_M = 0.05
 """Distance to the goal at which robots have arrived whose planner has no parameter ``arrive_m``."""
 KILO = 1000.0
-SEARCHED_M2 = 1e6
-"""Sum of (start to goal)^2 over the robots that get an A* reference: some 5 s of search."""
-
-
-class References(NamedTuple):
-    """The shortest ways of a world's robots, which do not depend on who plans."""
-
-    shortest_m: np.ndarray
-    """(N,) A* lengths, NaN without."""
-    any_angle_m: np.ndarray
-    """(N,) true shortest lengths, NaN without."""
-    wall_s: float
-    """How long they took to find (measured)."""
 
 
 class Contents(NamedTuple):
@@ -95,35 +80,8 @@ def play(
         setting = replace(setting, advice=make_advice(setup, *judged_by(scenario, setting.rig)))
     trace = run(setting, progress)
     if references is None:
-        references = find_references(scenario, setup, any_angle)
+        references = reference_ways(setup, scenario.robot.radius_m, any_angle)
     return Outcome(scenario, setup, setting, trace, references)
-
-
-def find_references(scenario: Scenario, setup: Setup, any_angle: bool = True) -> References:
-    """Find the shortest ways of the scenario's robots."""
-    return reference_ways(setup, scenario.robot.radius_m, any_angle)
-
-
-def reference_ways(setup: Setup, radius: float, any_angle: bool = True) -> References:
-    """Find the shortest ways of robots of ``radius`` [m]."""
-    robots = len(setup.starts)
-    begun = time.perf_counter()
-    chosen = _with_reference(setup)
-    ways = grid_paths(setup.world, setup.starts[chosen], setup.goals[chosen], radius)
-    wall_s = time.perf_counter() - begun
-    shortest, best = np.full((2, robots), np.nan)
-    shortest[chosen] = lengths_m(ways)
-    if any_angle and len(chosen) == robots <= ANY_ANGLE_ROBOTS:
-        best = lengths_m(any_angle_paths(setup.world, setup.starts, setup.goals, radius, ways))
-    return References(shortest, best, wall_s)
-
-
-def _with_reference(setup: Setup) -> np.ndarray:
-    """Return the robots that get a reference way: all, or of a large swarm evenly chosen ones."""
-    robots = len(setup.starts)
-    apart = setup.goals - setup.starts[:, :2]
-    share = min(1.0, SEARCHED_M2 / max(1.0, float((apart * apart).sum())))
-    return np.unique(np.linspace(0, robots - 1, max(1, int(share * robots))).astype(int))
 
 
 def run_scenario(

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
+from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Any
 
 import numpy as np
 
-from swarmscope._jit import jit
+from swarmscope._jit import jit_for
 from swarmscope.onboard.control.guard import guard
 from swarmscope.onboard.tick import guard_all, perceive, perceive_all
 from swarmscope.onboard.view import Swarm, python_view, view_of
@@ -34,7 +35,7 @@ def compiled_step(decide: Callable[..., None], module: ModuleType) -> Step:
     names = {"view_of": view_of, "perceive": perceive, "decide": decide, "guard": guard, "range": range}
     loop = FunctionType(_each.__code__.replace(co_name=name), names, name)
     loop.__qualname__, loop.__module__ = name, module.__name__
-    step: Step = jit(loop)
+    step: Step = jit_for(loop, Path(str(module.__file__)))
     return step
 
 

@@ -15,8 +15,6 @@ runs once a tick for each robot between perception and guard (``tick.py``). It m
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
@@ -26,8 +24,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from swarmscope.bounds import bounds_of, checked, words
-from swarmscope.errors import ConfigError, UnknownNameError
+from swarmscope.bounds import Field, converted, fields_of
+from swarmscope.errors import ConfigError, InputFileError
+from swarmscope.members import Kind, Need, check, find, is_text, load, names_of, text
 from swarmscope.onboard.loops import Step, batch_step, compiled_step, is_compiled, plain_step
 from swarmscope.onboard.reasons import REASON_NAMES
 from swarmscope.onboard.tick import guard_all, perceive_all
@@ -75,32 +74,29 @@ class Planner:
         """Its ``Params``."""
         return getattr(self.module, "Params", NoParams)
 
+    @cached_property
+    def fields(self) -> dict[str, Field]:
+        """What can be set."""
+        every = fields_of(self.params_type, f"planner '{self.name}'")
+        return {name: field for name, field in every.items() if name not in self.fixed}
+
     @property
     def defaults(self) -> dict[str, Any]:
         """What can be set, with defaults."""
-        return {k: v for k, v in self.params_type._field_defaults.items() if k not in self.fixed}
+        return {name: field.default for name, field in self.fields.items()}
 
-    def params(self, values: Mapping[str, Any] | None = None) -> Any:
-        """Return its parameters with ``values`` set, each converted to the declared type and within its bounds."""
-        values = values or {}
+    def settings(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """Return everything that can be set, with ``values`` set; errors name key, value, bounds and unit."""
         for key in values:
             if key in self.fixed:
                 raise ConfigError(f"planner '{self.name}': {key}", f"is fixed at {self.fixed[key]:g}")
-            if key not in self.defaults:
-                raise UnknownNameError("parameter", key, self.defaults, f"planner '{self.name}'")
-        kind, where = self.params_type, f"planner '{self.name}': "
-        bounds, merged = bounds_of(kind), self.defaults | dict(self.fixed) | dict(values)
-        defaults = kind._field_defaults.items()
-        return kind(**{k: checked(merged[k], default, bounds.get(k), where + k) for k, default in defaults})
+        return dict(converted(self.fields, values, f"planner '{self.name}'", "parameter"))
 
-    def bounds(self, name: str) -> str:
-        """Return the bounds of a parameter, for people to read."""
-        return words(bounds_of(self.params_type).get(name))
-
-    def settings(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Return everything that can be set, with ``values`` set."""
-        params = self.params(values)._asdict()
-        return {key: params[key] for key in self.defaults}
+    def params(self, values: Mapping[str, Any] | None = None) -> Any:
+        """Return its parameters with ``values`` set."""
+        kinds = self.params_type._field_defaults
+        fixed = {name: type(kinds[name])(value) for name, value in self.fixed.items()}
+        return self.params_type(**fixed, **self.settings(values or {}))
 
     @property
     def is_told(self) -> bool:
@@ -176,29 +172,54 @@ def _name_params(module: ModuleType) -> None:
         kind.__name__ = f"Params_{module.__name__.rpartition('.')[2]}"
 
 
-def planner_files() -> list[str]:
-    """Return the names of the modules in the planners' folder."""
-    import swarmscope.onboard.planning as folder
-
-    return [f"{folder.__name__}.{m.name}" for m in pkgutil.iter_modules(folder.__path__)]
+def _is_dtype(value: Any) -> bool:
+    return isinstance(value, np.dtype) and value.names is not None
 
 
-def all_planners() -> dict[str, Planner]:
-    """Return every planner by its name, in alphabetical order."""
-    found = {p.name: p for file in planner_files() for p in planners_in(importlib.import_module(file))}
-    return dict(sorted(found.items()))
+def _is_params(value: Any) -> bool:
+    return isinstance(value, type) and issubclass(value, tuple) and hasattr(value, "_field_defaults")
+
+
+KIND = Kind(
+    word="planner",
+    package="swarmscope.onboard.planning",
+    group="swarmscope.planners",
+    needs=(text("NAME"), text("SUMMARY"), text("NEEDS")),
+)
+OPTIONAL = (
+    Need("Params", "a NamedTuple with defaults", _is_params),
+    Need("MEMORY", "a numpy dtype with fields", _is_dtype),
+    Need("decide", "a function (see, memory, params)", callable),
+    Need("decide_all", "a function (first, last, swarm, memories, params)", callable),
+    Need("new_memory", "a function (robots)", callable),
+    Need("REASONS", "a tuple of texts", lambda v: isinstance(v, tuple) and all(map(is_text, v))),
+)
 
 
 def planner_names() -> list[str]:
     """Return the names of all planners."""
-    return list(all_planners())
+    return names_of(KIND)
+
+
+def planner_file(name: str) -> Path:
+    """Return the file of a planner, without importing it."""
+    return find(KIND, name).file
+
+
+def all_planners() -> dict[str, Planner]:
+    """Return every planner by its name, in alphabetical order."""
+    return {name: load_planner(name) for name in planner_names()}
 
 
 def load_planner(name: str) -> Planner:
-    """Return the planner ``name``; raises UnknownNameError with the nearest name."""
-    own_file = [file for file in planner_files() if file.rpartition(".")[2] == name.replace("-", "_")]
-    for file in own_file or planner_files():
-        for planner in planners_in(importlib.import_module(file)):
-            if planner.name == name:
-                return planner
-    raise UnknownNameError("planner", name, planner_names())
+    """Return the planner called ``name``, or the one in a ``FILE.py``.
+
+    Errors: UnknownNameError with the nearest name; InputFileError for a file that defines no planner.
+    """
+    module = load(KIND, name)
+    optional = tuple(need for need in OPTIONAL if hasattr(module, need.name))
+    check(module, KIND._replace(needs=optional), Path(str(module.__file__)))
+    if not hasattr(module, "decide") and not hasattr(module, "decide_all"):
+        raise InputFileError(str(module.__file__), "has no decide(see, memory, params), which every planner defines")
+    found = {planner.name: planner for planner in planners_in(module)}
+    return found.get(name, found[module.NAME])

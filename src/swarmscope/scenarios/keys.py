@@ -8,12 +8,13 @@ import re
 import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import is_dataclass
-from typing import Any, Literal, NamedTuple, get_args, get_origin, get_type_hints
+from typing import Any, NamedTuple, get_args
 
+from swarmscope.bounds import Field, about
 from swarmscope.onboard.planners import load_planner
 from swarmscope.scenarios.scenario import Scenario
-from swarmscope.scenarios.to_kernels import task_options
 from swarmscope.tasks import load_task
+from swarmscope.tasks._contract import option_fields
 
 UNITS = {
     "mps2": "m/s²", "radps": "rad/s", "mps": "m/s", "bps": "bit/s", "m": "m", "s": "s", "deg": "°", "rad": "rad",
@@ -53,31 +54,18 @@ def meanings() -> dict[str, str]:
 def task_keys(name: str) -> list[Key]:
     """Return the options of a task."""
     task = load_task(name)
-    kinds = [kind for kind in vars(task).values() if isinstance(kind, type) and is_dataclass(kind)]
-    hints: dict[str, Any] = {}
     docs: dict[str, str] = {}
-    for kind in kinds:
-        hints |= get_type_hints(kind)
-        docs |= docs_of(kind)
-    return [
-        _key(f"task.options.{option}", _words(hints.get(option), default), default, docs.get(option, ""))
-        for option, default in task_options(task).items()
-    ]
+    for kind in vars(task).values():
+        if isinstance(kind, type) and is_dataclass(kind):
+            docs |= docs_of(kind)
+    return [_member_key("task.options", field, docs) for field in option_fields(task).values()]
 
 
 def planner_keys(name: str) -> list[Key]:
     """Return the parameters of a planner."""
     planner = load_planner(name)
     docs = docs_of(planner.params_type)
-    found = []
-    for param, default in planner.defaults.items():
-        low, _, high = planner.bounds(param).partition(" to ")
-        high, _, unit = high.partition(" ")
-        what = "whole number" if isinstance(default, int) else "number"
-        takes = f"{what} ≥ {low}, ≤ {high}" if high else what
-        key = _key(f"planner.params.{param}", takes, default, docs.get(param, ""))
-        found.append(key._replace(unit=key.unit or UNITS.get(unit, unit)))
-    return found
+    return [_member_key("planner.params", field, docs) for field in planner.fields.values()]
 
 
 def docs_of(kind: type) -> dict[str, str]:
@@ -141,11 +129,12 @@ def _takes(field: Mapping[str, Any]) -> str:
     return " ".join([KINDS[field["type"]], ", ".join(bounds)]).strip()
 
 
-def _words(hint: Any, default: Any) -> str:
-    """Return what an option of a task takes."""
-    if get_origin(hint) is Literal:
-        return ", ".join(str(word) for word in get_args(hint))
-    return "text" if isinstance(default, str) else "number ≥ 0"
+def _member_key(group: str, field: Field, docs: Mapping[str, str]) -> Key:
+    """Return what can be set of a task or a planner."""
+    unit = field.bounds.unit
+    takes = about(field._replace(bounds=field.bounds._replace(unit="")))
+    key = _key(f"{group}.{field.name}", takes, field.default, docs.get(field.name, ""))
+    return key._replace(unit=UNITS.get(unit, unit) or key.unit)
 
 
 def _key(name: str, takes: str, default: Any, text: str) -> Key:

@@ -10,9 +10,10 @@ from pydantic import ValidationError
 
 from swarmscope.errors import ConfigError, InputFileError, UnknownNameError, nearest_hint
 from swarmscope.onboard.planners import load_planner, planner_names
+from swarmscope.scenarios.places import is_packaged
 from swarmscope.scenarios.scenario import Scenario
-from swarmscope.sim.maps import packaged_map
-from swarmscope.tasks._contract import task_names
+from swarmscope.tasks import task_names
+from swarmscope.user_files import is_file_name, read_code
 
 
 def parse_scenario(values: Any, where: str) -> Scenario:
@@ -23,17 +24,24 @@ def parse_scenario(values: Any, where: str) -> Scenario:
         scenario = Scenario.model_validate(values)
     except ValidationError as error:
         raise _first_problem(error, where) from None
-    if scenario.task is not None and scenario.task.name not in task_names():
-        raise UnknownNameError("task", scenario.task.name, task_names(), f"{where}: task.name")
-    if scenario.planner.name not in planner_names():
-        raise UnknownNameError("planner", scenario.planner.name, planner_names(), f"{where}: planner.name")
+    if scenario.task is not None:
+        _check_known("task", scenario.task.name, task_names(), where)
+    _check_known("planner", scenario.planner.name, planner_names(), where)
     if scenario.planner.model is not None and load_planner(scenario.planner.name).model is None:
         raise ConfigError(f"{where}: planner.model", f"planner '{scenario.planner.name}' runs no network")
     return scenario
 
 
+def _check_known(kind: str, name: str, names: list[str], where: str) -> None:
+    """Raise an error that names the place unless there is such a member; a user's file is not run."""
+    if is_file_name(name):
+        read_code(Path(name))
+    elif name not in names:
+        raise UnknownNameError(kind, name, names, f"{where}: {kind}.name")
+
+
 def read_scenario_file(path: Path) -> dict[str, Any]:
-    """Return the mapping in YAML file ``path``, not validated yet; a map file and a model are looked for beside it."""
+    """Return the mapping in YAML file ``path``, not validated yet; files are looked for beside it."""
     try:
         values = yaml.safe_load(path.read_text(encoding="utf-8"))
     except UnicodeDecodeError:
@@ -44,6 +52,7 @@ def read_scenario_file(path: Path) -> dict[str, Any]:
         raise InputFileError(path, f"is not YAML ({' '.join(str(error).split())})") from None
     if not isinstance(values, dict):
         raise ConfigError(str(path), "a scenario is a mapping of keys to values")
+    find_user_files(values, path.parent)
     place = values.get("map")
     if isinstance(place, dict) and isinstance(place.get("file"), str):
         place["file"] = _find_map(path, place["file"])
@@ -51,6 +60,14 @@ def read_scenario_file(path: Path) -> dict[str, Any]:
     if isinstance(planner, dict) and isinstance(planner.get("model"), str):
         planner["model"] = _find_beside(path, planner["model"])
     return values
+
+
+def find_user_files(values: dict[str, Any], folder: Path) -> None:
+    """Make the names of users' planners and tasks in the keys of a scenario whole paths; they lie in ``folder``."""
+    for group in ("planner", "task"):
+        chosen = values.get(group)
+        if isinstance(chosen, dict) and isinstance(chosen.get("name"), str) and is_file_name(chosen["name"]):
+            chosen["name"] = str((folder / chosen["name"]).resolve())
 
 
 def _find_map(scenario: Path, name: str) -> str:
@@ -92,13 +109,3 @@ def _valid_keys(loc: tuple[int | str, ...]) -> list[str]:
         options = [k for k in getattr(kind, "__args__", ()) if hasattr(k, "model_fields")]
         model = options[0] if options else kind
     return list(getattr(model, "model_fields", {}))
-
-
-def map_path(name: str) -> Path:
-    """Return the YAML file of a map: a path, or the name of a map that comes with the package."""
-    return packaged_map(name) if is_packaged(name) else Path(name)
-
-
-def is_packaged(name: str) -> bool:
-    """Tell whether this is the name of a map that comes with the package, not a path."""
-    return not name.endswith((".yaml", ".yml"))

@@ -3,75 +3,45 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, is_dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from swarmscope.errors import ConfigError
 from swarmscope.onboard.body import Body
 from swarmscope.onboard.planners import Planner, load_planner
 from swarmscope.onboard.rig import Guarding, Rig, Safety, Sharing, make_rig
 from swarmscope.onboard.sensor import Sensor
-from swarmscope.scenarios.read import is_packaged, map_path
+from swarmscope.scenarios.places import is_packaged
 from swarmscope.scenarios.scenario import NoiseModel, PlannerModel, Scenario
 from swarmscope.sim.lidar import make_beams
 from swarmscope.sim.loop import Setting
-from swarmscope.sim.maps import load_map
 from swarmscope.sim.state import Noise, Radio
-from swarmscope.sim.world import WorldSpec, compile_world
-from swarmscope.tasks._contract import Option, Setup, load_task
+from swarmscope.sim.world import compile_world
+from swarmscope.tasks import Setup, load_task
+from swarmscope.tasks._contract import all_options
+from swarmscope.user_files import is_file_name
 
 
-def make_setup(scenario: Scenario) -> Setup:
-    """Return world, starts and goals of the scenario, checked to be solvable."""
-    radius = scenario.robot.radius_m
-    if scenario.task is not None:
-        task = load_task(scenario.task.name)
-        return task.make(scenario.seed, scenario.robots, radius, **scenario.task.options)
-    if scenario.map is not None:
-        from swarmscope.tasks import place_on_map
+def complete(scenario: Scenario, run_files: bool = True) -> dict[str, Any]:
+    """Return the scenario as plain values, every default written out; ``parse_scenario`` reads it back.
 
-        spec = map_world(map_path(scenario.map.file))
-        return place_on_map(spec, scenario.seed, scenario.robots, radius, scenario.map.min_distance_m)
-    place = scenario.place
-    if place is None or len(place.starts) != scenario.robots or len(place.goals) != scenario.robots:
-        raise ConfigError("place", f"needs as many starts and goals as robots ({scenario.robots})")
-    from swarmscope.tasks import check_setup
-
-    setup = Setup(place.world, np.array(place.starts, float), np.array(place.goals, float))
-    check_setup(setup, radius)
-    return setup
-
-
-def complete(scenario: Scenario) -> dict[str, Any]:
-    """Return the scenario as plain values, every default written out; ``parse_scenario`` reads it back."""
-    planner = load_planner(scenario.planner.name)
+    Unless ``run_files``, defaults that only running a user's file would tell are left out.
+    """
     values = scenario.model_dump(mode="json", exclude_none=True)
-    values["planner"]["params"] = planner.settings(scenario.planner.params)
-    if scenario.task is not None:
-        values["task"]["options"] = task_options(load_task(scenario.task.name)) | scenario.task.options
-    if scenario.planner.model is not None:
-        values["planner"]["model"] = str(Path(scenario.planner.model).resolve())
+    planner, task = scenario.planner, scenario.task
+    if run_files or not is_file_name(planner.name):
+        values["planner"]["params"] = load_planner(planner.name).settings(planner.params)
+    if task is not None and (run_files or not is_file_name(task.name)):
+        values["task"]["options"] = all_options(load_task(task.name), task.options)
+    for group in ("planner", "task"):
+        if group in values and is_file_name(values[group]["name"]):
+            values[group]["name"] = str(Path(values[group]["name"]).resolve())
+    if planner.model is not None:
+        values["planner"]["model"] = str(Path(planner.model).resolve())
     if scenario.map is not None and not is_packaged(scenario.map.file):
         values["map"]["file"] = str(Path(scenario.map.file).resolve())
     return values
-
-
-def task_options(task: Any) -> dict[str, Option]:
-    """Return the options of a task module with their defaults: the fields of its ``...Options`` dataclass."""
-    kinds: list[Any] = [k for name, k in vars(task).items() if name.endswith("Options") and is_dataclass(k)]
-    values = [item for kind in kinds for item in asdict(kind()).items()]
-    return {name: value if isinstance(value, str) else float(value) for name, value in values}
-
-
-def map_world(path: Path) -> WorldSpec:
-    """Return the world of a map_server map."""
-    grid = load_map(path)
-    x, y = grid.origin
-    bounds = (x, y, x + grid.width * grid.resolution, y + grid.height * grid.resolution)
-    return WorldSpec(obstacles=[grid], bounds=bounds)
 
 
 def make_rig_of(scenario: Scenario) -> Rig:

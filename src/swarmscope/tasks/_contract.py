@@ -1,28 +1,34 @@
-"""What a task is, and how one is found by its name.
+"""What a task is, and how one is found.
 
-A task is one file of this folder: its name in lower case is the file's name, and it defines ``NAME``,
-``SUMMARY`` (one line) and ``make(seed, robots, radius, **options) -> Setup``. A file is imported when it is
-asked for.
+A task is a Python file (see ``members``) that defines ``NAME``, ``SUMMARY`` (one line) and
+``make(seed, robots, radius, ...) -> Setup``. What can be set are the fields of the dataclass ``OPTIONS``, or without
+one the parameters of ``make`` after these three. The files of this folder are called like their tasks in lower case.
 """
 
 from __future__ import annotations
 
-import importlib
-import math
+import inspect
 from collections.abc import Mapping
-from contextlib import suppress
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, is_dataclass
 from pathlib import Path
-from typing import Any, Protocol, TypeVar, cast, get_args, get_type_hints
+from typing import Annotated, Any, Protocol, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swarmscope.errors import ConfigError, UnknownNameError
+from swarmscope import members
+from swarmscope.bounds import Bounds, Field, Value, converted, fields_of, fields_of_function
+from swarmscope.errors import ConfigError, InputFileError
+from swarmscope.members import Kind, Need, text
 from swarmscope.sim.world import WorldSpec
+from swarmscope.user_files import is_file_name
 
 Option = float | str
 """What an option can be: a number, or one of a few words."""
+
+Amount = Annotated[float, Bounds(0.0)]
+Density = Annotated[float, Bounds(0.0, unit="1/m^2")]
+Length = Annotated[float, Bounds(0.0, unit="m")]
 
 Options = TypeVar("Options")
 
@@ -48,50 +54,54 @@ class Task(Protocol):
         ...
 
 
+TASKS = Kind(
+    "task",
+    "swarmscope.tasks",
+    "swarmscope.tasks",
+    needs=(text("NAME"), text("SUMMARY"), Need("make", "a function make(seed, robots, radius, ...)", callable)),
+)
+
+
 def load_task(name: str) -> Task:
-    """Import the task called ``name`` (upper or lower case)."""
-    stem = name.lower()
-    if stem not in _stems():
-        raise UnknownNameError("task", name, task_names())
-    return cast("Task", importlib.import_module(f"{__package__}.{stem}"))
+    """Import the task called ``name`` (upper or lower case), or the one in a user's FILE.py."""
+    known = {} if is_file_name(name) else {one.lower(): one for one in task_names()}
+    return cast("Task", members.load(TASKS, known.get(name.lower(), name)))
 
 
 def task_names() -> list[str]:
-    """Return the names of all tasks, in alphabetical order."""
-    return sorted((load_task(stem).NAME for stem in _stems()), key=str.lower)
+    """Return the names of all tasks that are installed, in alphabetical order."""
+    return members.names_of(TASKS)
+
+
+def task_file(name: str) -> Path:
+    """Return the file of a task without importing it."""
+    return members.find(TASKS, name).file
+
+
+def option_fields(task: Task) -> dict[str, Field]:
+    """Return the options of a task. Errors: an InputFileError names what is wrong with how they are declared."""
+    file, kind = Path(str(getattr(task, "__file__", task.NAME))), getattr(task, "OPTIONS", None)
+    try:
+        if kind is not None:
+            if not (isinstance(kind, type) and is_dataclass(kind)):
+                raise ConfigError("OPTIONS", "is not a dataclass")
+            return fields_of(kind, "OPTIONS")
+        if any(p.kind == p.VAR_KEYWORD for p in inspect.signature(task.make).parameters.values()):
+            raise ConfigError("make", "takes any options (**): declare them in a dataclass OPTIONS")
+        return fields_of_function(task.make, 3, "make")
+    except ConfigError as error:
+        raise InputFileError(file, str(error)) from None
+
+
+def all_options(task: Task, options: Mapping[str, Any]) -> dict[str, Value]:
+    """Return every option of a task, converted and checked. Errors: ConfigError, UnknownNameError."""
+    return converted(option_fields(task), options, f"task {task.NAME}", "option")
 
 
 def read_options(kind: type[Options], options: Mapping[str, Any], task: str) -> Options:
-    """Return the dataclass ``kind`` filled with ``options``.
-
-    Every field of it is a number >= 0, or, where it is declared as a ``Literal`` of words, one of these.
-    """
-    hints, where = get_type_hints(kind), f"task {task}"
-    valid = [field.name for field in fields(cast("Any", kind))]
-    values: dict[str, Option] = {}
-    for name, value in options.items():
-        if name not in valid:
-            raise UnknownNameError("option", name, valid, where)
-        words = [word for word in get_args(hints[name]) if isinstance(word, str)]
-        values[name] = _word(name, value, words, where) if words else _number(name, value, where)
-    return kind(**values)
-
-
-def _word(name: str, value: Any, words: list[str], where: str) -> str:
-    if value not in words:
-        raise UnknownNameError(name, str(value), words, where)
-    return str(value)
-
-
-def _number(name: str, value: Any, where: str) -> float:
-    """Return a number >= 0; text that reads as a number is one (YAML 1.1 takes 1e-3 for text)."""
-    number = math.nan
-    if isinstance(value, int | float | str) and not isinstance(value, bool):
-        with suppress(ValueError):
-            number = float(value)
-    if not (math.isfinite(number) and number >= 0.0):
-        raise ConfigError(f"{where}: {name}", f"must be a number >= 0, not {value!r}")
-    return number
+    """Return the dataclass ``kind`` filled with ``options``, converted and checked."""
+    where = f"task {task}"
+    return kind(**converted(fields_of(kind, where), options, where, "option"))
 
 
 def check_robots(robots: int, radius: float) -> None:
@@ -100,8 +110,3 @@ def check_robots(robots: int, radius: float) -> None:
         raise ConfigError("robots", f"must be a whole number >= 1, not {robots!r}")
     if not (np.isfinite(radius) and radius > 0.0):
         raise ConfigError("radius", f"must be a length > 0 m, not {radius!r}")
-
-
-def _stems() -> list[str]:
-    folder = Path(__file__).parent
-    return sorted(path.stem for path in folder.glob("*.py") if not path.stem.startswith("_"))

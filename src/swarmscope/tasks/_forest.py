@@ -30,7 +30,7 @@ from swarmscope._jit import jit_alloc as jit
 from swarmscope.errors import ConfigError, UnsolvableWorldError
 from swarmscope.sim.world import Circle, Obstacle, Polygon, WorldSpec
 from swarmscope.tasks._check import Reach, unreachable
-from swarmscope.tasks._contract import Setup
+from swarmscope.tasks._contract import Density, Length, Setup
 from swarmscope.tasks._rocks import Rocks, draw_rocks
 
 MARGIN_M = 0.60  # between a tree's surface and the centre of a start or goal, at least
@@ -50,10 +50,10 @@ Ints = NDArray[np.int64]
 class ForestOptions:
     """Sizes of a forest; the defaults are Nav-SCOPE's 140 trees in 400 m^2."""
 
-    size_m: float = 20.0  # side of the square; a disc has the same area
-    density: float = 0.35  # trees per m^2
-    radius_min: float = 0.15  # of the smallest tree [m]
-    radius_max: float = 0.35  # of the largest tree [m]
+    size_m: Length = 20.0  # side of the square; a disc has the same area
+    density: Density = 0.35  # trees per m^2
+    radius_min: Length = 0.15  # of the smallest tree
+    radius_max: Length = 0.35  # of the largest tree
     obstacles: Literal["trees", "rocks"] = "trees"  # rocks are convex polygons of the same areas
 
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from swarmscope.errors import ConfigError, UnsolvableWorldError
 from swarmscope.sim.world import Circle, Obstacle, Polygon, WorldSpec
+from swarmscope.tasks._contract import Amount, Length
 from swarmscope.tasks._rooms import WALL_M, closed_room
 
 SIZE_M = 20.0
@@ -36,10 +37,10 @@ class MapOptions:
     """Sizes; the defaults are those of the document."""
 
     obstacles: Kind = "C"  # A rectangles, B cylinders, C both
-    size_m: float = SIZE_M  # side of the map
-    fewest: float = FEWEST  # obstacles on it, at least
-    most: float = MOST  # and at most
-    apart_m: float = 7.0  # from a start to its goal, at least (task I)
+    size_m: Length = SIZE_M  # side of the map
+    fewest: Amount = FEWEST  # obstacles on it, at least
+    most: Amount = MOST  # and at most
+    apart_m: Length = 7.0  # from a start to its goal, at least (task I)
 
 
 class Sizes(NamedTuple):

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from swarmscope.tasks._contract import Option, Setup, check_robots, read_options
+from swarmscope.tasks._contract import Length, Option, Setup, check_robots, read_options
 from swarmscope.tasks._rooms import Passage, two_rooms
 
 NAME = "corridor"
@@ -19,17 +19,20 @@ LENGTHS, WIDTHS = (0.8, 1.2), (1.0, 1.15)  # the seed's share of the options
 class CorridorOptions:
     """Sizes [m]."""
 
-    width_m: float = 1.5  # of the corridor; wider for robots that could not pass in it
-    length_m: float = 8.0  # of the corridor
-    room_m: float = 4.0  # width of the rooms at both ends
-    gap_m: float = 1.2  # from the corridor to the first robots
+    width_m: Length = 1.5  # of the corridor; wider for robots that could not pass in it
+    length_m: Length = 8.0  # of the corridor
+    room_m: Length = 4.0  # width of the rooms at both ends
+    gap_m: Length = 1.2  # from the corridor to the first robots
+
+
+OPTIONS = CorridorOptions
 
 
 def make(seed: int, robots: int = 6, radius: float = 0.15, **options: Option) -> Setup:
     """Return two rooms and a corridor between them; the seed changes its length, width and place, moves the
     starts a little, and permutes goals."""
     check_robots(robots, radius)
-    chosen = read_options(CorridorOptions, options, NAME)
+    chosen = read_options(OPTIONS, options, NAME)
     rng = np.random.default_rng(seed)
     length = chosen.length_m * float(rng.uniform(*LENGTHS))
     width = max(chosen.width_m, 4.0 * radius + 3.0 * PASSING_M) * float(rng.uniform(*WIDTHS))

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from swarmscope.errors import ConfigError, UnsolvableWorldError
 from swarmscope.sim.world import Circle, Obstacle, WorldSpec
 from swarmscope.tasks._check import Reach, check_setup, unreachable
-from swarmscope.tasks._contract import Option, Setup, check_robots, read_options
+from swarmscope.tasks._contract import Amount, Density, Length, Option, Setup, check_robots, read_options
 from swarmscope.tasks._forest import MARGIN_M, ROOM_M, smallest_spacing
 from swarmscope.tasks._rocks import draw_rocks
 from swarmscope.tasks._rooms import WALL_M, Box, closed_room, polygon
@@ -44,13 +44,16 @@ Floats = NDArray[np.float64]
 class DepositoryOptions:
     """Sizes of the room."""
 
-    way_m: float = 9.8  # from the starts to the goals
-    width_m: float = 7.0  # wider for more robots than fit side by side
-    density: float = 0.38  # things per m^2 of the cluttered floor
-    size: float = 1.0  # of the things, times ours
-    stack: float = 4.0  # things in a stack, at most
-    aisle_m: float = 1.0  # between stacks, and between stacks and walls, at least
-    spare_m: float = 0.1  # that a way leaves on both sides; r_e + 0.1 m is the published r = 0.49 m + 0.04 m
+    way_m: Length = 9.8  # from the starts to the goals
+    width_m: Length = 7.0  # wider for more robots than fit side by side
+    density: Density = 0.38  # things per m^2 of the cluttered floor
+    size: Amount = 1.0  # of the things, times ours
+    stack: Amount = 4.0  # things in a stack, at most
+    aisle_m: Length = 1.0  # between stacks, and between stacks and walls, at least
+    spare_m: Length = 0.1  # that a way leaves on both sides; r_e + 0.1 m is the published r = 0.49 m + 0.04 m
+
+
+OPTIONS = DepositoryOptions
 
 
 class _Thing(NamedTuple):
@@ -71,7 +74,7 @@ class _NoRoomError(Exception):
 def make(seed: int, robots: int = 5, radius: float = 0.43, **options: Option) -> Setup:
     """Return a solvable store room; draw d uses the random stream (seed, d)."""
     check_robots(robots, radius)
-    chosen = read_options(DepositoryOptions, options, NAME)
+    chosen = read_options(OPTIONS, options, NAME)
     fits = False
     for draw in range(REDRAWS + 1):
         try:

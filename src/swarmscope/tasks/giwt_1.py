@@ -39,10 +39,13 @@ class Options(MapOptions):
     moves: Literal["one", "all"] = "one"  # one: robot 0, the others stand; all: everybody
 
 
+OPTIONS = Options
+
+
 def make(seed: int, robots: int = 15, radius: float = 0.15, **options: Option) -> Setup:
     """Return a solvable map with robots in its free space; options are the fields of `Options`."""
     check_robots(robots, radius)
-    chosen = grown(read_options(Options, options, NAME), robots)
+    chosen = grown(read_options(OPTIONS, options, NAME), robots)
     check_counts(chosen.fewest, chosen.most, NAME)
     for draw in range(DRAWS):
         rng = np.random.default_rng([seed, draw])

@@ -11,6 +11,7 @@ from swarmscope.tasks._giwt_maps import MapOptions, check_counts, draw_map, unso
 
 NAME = "GIWT_2"
 SUMMARY = "GIWT's task II: a column of robots crosses a random map from left to right, all in the same order"
+OPTIONS = MapOptions
 
 EDGE_M = 0.5  # from the walls to the starts and the goals
 FREE_M = 0.35  # from them to an obstacle, beyond the robot's radius
@@ -22,7 +23,7 @@ Floats = NDArray[np.float64]
 def make(seed: int, robots: int = 15, radius: float = 0.15, **options: Option) -> Setup:
     """Return a solvable map and two columns; options are the fields of `MapOptions`."""
     check_robots(robots, radius)
-    chosen = read_options(MapOptions, options, NAME)
+    chosen = read_options(OPTIONS, options, NAME)
     check_counts(chosen.fewest, chosen.most, NAME)
     starts, goals = columns(robots, radius, chosen.size_m)
     for draw in range(DRAWS):

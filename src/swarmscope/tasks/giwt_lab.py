@@ -14,7 +14,7 @@ import numpy as np
 
 from swarmscope.sim.world import WorldSpec
 from swarmscope.tasks._check import Reach, unreachable
-from swarmscope.tasks._contract import Option, Setup, check_robots, read_options
+from swarmscope.tasks._contract import Amount, Length, Option, Setup, check_robots, read_options
 from swarmscope.tasks._forest import smallest_spacing
 from swarmscope.tasks._giwt_maps import Kind, Sizes, check_counts, draw_obstacles, unsolvable
 from swarmscope.tasks._rooms import WALL_M, closed_room
@@ -34,16 +34,19 @@ class LabOptions:
     """The floor and what stands on it."""
 
     obstacles: Kind = "C"  # A rectangles, B cylinders, C both
-    width_m: float = 8.0  # wider for more robots than fit side by side
-    length_m: float = 10.0  # the way is 2 (EDGE_M + radius) shorter
-    fewest: float = 6.0  # obstacles on it, at least
-    most: float = 12.0  # and at most
+    width_m: Length = 8.0  # wider for more robots than fit side by side
+    length_m: Length = 10.0  # the way is 2 (EDGE_M + radius) shorter
+    fewest: Amount = 6.0  # obstacles on it, at least
+    most: Amount = 12.0  # and at most
+
+
+OPTIONS = LabOptions
 
 
 def make(seed: int, robots: int = 5, radius: float = 0.15, **options: Option) -> Setup:
     """Return a solvable floor; draw d of a seed uses the random stream (seed, d)."""
     check_robots(robots, radius)
-    chosen = read_options(LabOptions, options, NAME)
+    chosen = read_options(OPTIONS, options, NAME)
     check_counts(chosen.fewest, chosen.most, NAME)
     width, length = max(chosen.width_m, robots * smallest_spacing(radius)), chosen.length_m
     x, aside = (np.arange(robots) + 0.5) * width / robots, EDGE_M + radius

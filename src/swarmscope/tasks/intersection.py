@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from swarmscope.sim.world import Obstacle
-from swarmscope.tasks._contract import Option, Setup, check_robots, read_options
+from swarmscope.tasks._contract import Length, Option, Setup, check_robots, read_options
 from swarmscope.tasks._rooms import (
     ASIDE_M,
     BETWEEN_M,
@@ -34,8 +34,11 @@ WIDTHS, GAPS = (1.0, 1.2), (0.8, 1.2)  # the seed's share of the options
 class IntersectionOptions:
     """Sizes [m]."""
 
-    width_m: float = 2.0  # of the corridors; wider for robots of which two could not pass
-    gap_m: float = 2.5  # from the crossing to the first robots of an arm
+    width_m: Length = 2.0  # of the corridors; wider for robots of which two could not pass
+    gap_m: Length = 2.5  # from the crossing to the first robots of an arm
+
+
+OPTIONS = IntersectionOptions
 
 
 def make(seed: int, robots: int = 8, radius: float = 0.15, **options: Option) -> Setup:
@@ -45,7 +48,7 @@ def make(seed: int, robots: int = 8, radius: float = 0.15, **options: Option) ->
     the starts of the opposite group.
     """
     check_robots(robots, radius)
-    chosen = read_options(IntersectionOptions, options, NAME)
+    chosen = read_options(OPTIONS, options, NAME)
     rng = np.random.default_rng(seed)
     least = max(chosen.width_m, 4.0 * radius + 3.0 * PASSING_M)
     across = least * rng.uniform(*WIDTHS, 2)  # width of the corridor along x, and of that along y

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from swarmscope.errors import ConfigError
-from swarmscope.tasks._contract import Option, Setup, check_robots, read_options
+from swarmscope.tasks._contract import Length, Option, Setup, check_robots, read_options
 from swarmscope.tasks._rooms import EDGE_M, bar, jitter, ranks, setup_of, spacing
 
 NAME = "long_wall"
@@ -21,8 +21,11 @@ TILT_RAD = 0.25  # how far the wall is turned, at most
 class LongWallOptions:
     """Sizes [m]."""
 
-    length_m: float = 10.0  # of the wall; for wide ranks, as much longer as these are wider than 2.7 m
-    distance_m: float = 3.0  # from the wall to the first robots, and to the first goals
+    length_m: Length = 10.0  # of the wall; for wide ranks, as much longer as these are wider than 2.7 m
+    distance_m: Length = 3.0  # from the wall to the first robots, and to the first goals
+
+
+OPTIONS = LongWallOptions
 
 
 USUAL_M = 2.7  # width of four robots of 0.15 m
@@ -34,7 +37,7 @@ def make(seed: int, robots: int = 4, radius: float = 0.15, **options: Option) ->
     The seed changes the wall's length, turns it, and decides which end is nearer and by how much.
     """
     check_robots(robots, radius)
-    chosen = read_options(LongWallOptions, options, NAME)
+    chosen = read_options(OPTIONS, options, NAME)
     rng = np.random.default_rng(seed)
     group = ranks(robots, ABREAST_M, radius)
     wide = 2.0 * float(np.abs(group.places[:, 1]).max())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from swarmscope.tasks._contract import Option, Setup, check_robots, read_options
+from swarmscope.tasks._contract import Length, Option, Setup, check_robots, read_options
 from swarmscope.tasks._forest import open_field, rings
 
 NAME = "swap"
@@ -15,11 +15,14 @@ SUMMARY = "go to the antipodal point of a ring, without any obstacle"
 class SwapOptions:
     """Size of the open field."""
 
-    size_m: float = 20.0  # side of a square of the same area as the disc inside the ring
+    size_m: Length = 20.0  # side of a square of the same area as the disc inside the ring
+
+
+OPTIONS = SwapOptions
 
 
 def make(seed: int, robots: int = 15, radius: float = 0.15, **options: Option) -> Setup:
     """Return a ring of robots; ``seed`` changes nothing, nothing is random here."""
     check_robots(robots, radius)
-    chosen = read_options(SwapOptions, options, NAME)
+    chosen = read_options(OPTIONS, options, NAME)
     return open_field(rings(robots, radius, chosen.size_m))

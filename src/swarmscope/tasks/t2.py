@@ -11,12 +11,13 @@ from swarmscope.tasks._forest import GOALS, ForestOptions, lines, plant, yaw_tow
 
 NAME = "T2"
 SUMMARY = "cross a square forest from left to right, goals permuted at random"
+OPTIONS = ForestOptions
 
 
 def make(seed: int, robots: int = 15, radius: float = 0.15, **options: Option) -> Setup:
     """Return a solvable forest and two lines; options are the fields of `ForestOptions`."""
     check_robots(robots, radius)
-    chosen = read_options(ForestOptions, options, NAME)
+    chosen = read_options(OPTIONS, options, NAME)
     places = lines(robots, radius, chosen.size_m)
     goals = places.goals[np.random.default_rng([seed, GOALS]).permutation(robots)]
     x, y = places.starts[:, 0], places.starts[:, 1]

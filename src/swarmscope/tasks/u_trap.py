@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from swarmscope.tasks._contract import Option, Setup, check_robots, read_options
+from swarmscope.tasks._contract import Length, Option, Setup, check_robots, read_options
 from swarmscope.tasks._rooms import ASIDE_M, EDGE_M, WALL_M, box, jitter, ranks, setup_of
 
 NAME = "u_trap"
@@ -19,10 +19,13 @@ SIZES = (0.8, 1.2)  # the seed's share of the options
 class UTrapOptions:
     """Sizes [m]."""
 
-    depth_m: float = 3.0  # from the mouth to the back
-    width_m: float = 4.5  # between the arms; wide enough for the first rank
-    before_m: float = 2.5  # from the first robots to the mouth
-    behind_m: float = 2.0  # from the back to the first goals
+    depth_m: Length = 3.0  # from the mouth to the back
+    width_m: Length = 4.5  # between the arms; wide enough for the first rank
+    before_m: Length = 2.5  # from the first robots to the mouth
+    behind_m: Length = 2.0  # from the back to the first goals
+
+
+OPTIONS = UTrapOptions
 
 
 def make(seed: int, robots: int = 4, radius: float = 0.15, **options: Option) -> Setup:
@@ -31,7 +34,7 @@ def make(seed: int, robots: int = 4, radius: float = 0.15, **options: Option) ->
     The seed changes the lengths of the arms, each by itself, the width, and how far the U is off the middle.
     """
     check_robots(robots, radius)
-    chosen = read_options(UTrapOptions, options, NAME)
+    chosen = read_options(OPTIONS, options, NAME)
     rng = np.random.default_rng(seed)
     group = ranks(robots, ABREAST_M, radius)
     least = 2.0 * (float(np.abs(group.places[:, 1]).max()) + radius + ASIDE_M)

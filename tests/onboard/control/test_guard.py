@@ -10,9 +10,10 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from adversary import closest
-from helpers import DT, Rows, circles_world, make_sensor, place_sim, rig_of, scan_at, world_of
+from helpers import DT, circles_world, make_sensor, one_robot, place_sim, rig_of, scan_at, seen, world_of
 from swarmscope.onboard.body import Body
-from swarmscope.onboard.control.guard import guard, halt, head_for
+from swarmscope.onboard.control.guard import guard
+from swarmscope.onboard.control.wanting import halt, head_for
 from swarmscope.onboard.sharing.tracks import update_odometry, update_tracks
 from swarmscope.sim.world import WorldSpec, compile_world
 
@@ -23,12 +24,12 @@ FINE = 200
 
 def guarded(ranges, v0, v, w, rig=None, rows=None):
     """Let the guard have its say; return (v, w, whether it intervened)."""
-    rows = rows or Rows(rig or rig_of())
-    rows.percepts["speed"] = v0
-    rows.decisions["v"], rows.decisions["w"] = v, w
-    near = np.zeros(len(ranges) + 1, np.int16)
-    slowed = guard(ranges, rows.percept, rows.memory, rows.decision, near, rows.rig)
-    return float(rows.decisions["v"][0]), float(rows.decisions["w"][0]), bool(slowed)
+    rows = rows or one_robot(rig)
+    rows.scan[:] = ranges
+    rows.fill(speed=v0)
+    rows.decision["v"], rows.decision["w"] = v, w
+    slowed = guard(rows.view)
+    return rows.said("v"), rows.said("w"), bool(slowed)
 
 
 def naive_path(v0, v, w, body=BODY):
@@ -85,7 +86,7 @@ def test_what_is_plainly_free_is_let_through(circles, v, w):
     """A command whose naive path keeps twice the clearance from everything is not touched."""
     rig = rig_of()
     points = naive_path(0.0, v, w)
-    assume(gap_to(circles, points) > BODY.radius_m + 2.0 * rig.clearance + 0.01)
+    assume(gap_to(circles, points) > BODY.radius_m + 2.0 * rig.guarding.clearance_m + 0.01)
     assert guarded(scan_at(circles_world(circles), rig), 0.0, v, w) == pytest.approx((v, w, False))
 
 
@@ -146,20 +147,20 @@ def test_turning_on_the_spot_is_always_allowed_at_rest():
 
 
 def test_halt_and_head_for():
-    rows = Rows(rig_of())
-    head_for(rows.decision, rows.percept, 0.2, 0.5, rows.rig)
-    assert rows.decisions[["v", "w", "heading"]][0].tolist() == pytest.approx((0.5, 1.0, 0.2))
-    halt(rows.decision)
-    assert rows.decisions[["v", "w"]][0].tolist() == (0.0, 0.0)
+    rows = one_robot()
+    head_for(rows.view, 0.2, 0.5)
+    assert rows.decision[["v", "w", "heading"]].tolist() == pytest.approx((0.5, 1.0, 0.2))
+    halt(rows.view)
+    assert rows.decision[["v", "w"]].tolist() == (0.0, 0.0)
 
 
-def meeting(distance, v0, v, rig, seen=True):
-    """Robot 0 drives at a robot ``distance`` [m] ahead; ``seen`` by the positioning or only by the LiDAR."""
-    rows = Rows(rig)
-    if seen:
-        rows.see((3, distance, 0.0, math.pi))
-    update_odometry(rows.percept, rows.memory)
-    update_tracks(rows.percept, rows.memory, rig, 0.0, 0.0)
+def meeting(distance, v0, v, rig, known=True):
+    """Robot 0 drives at a robot ``distance`` [m] ahead; ``known`` by the positioning or only by the LiDAR."""
+    rows = one_robot(rig)
+    if known:
+        rows.see([seen(3, distance, 0.0, math.pi)])
+    update_odometry(rows.percept, rows.shared)
+    update_tracks(rows.percept, rows.shared, rig, 0.0, 0.0)
     return guarded(scan_at(circles_world([(distance, 0.0, rig.body.radius_m)]), rig), v0, v, 0.0, rows=rows)
 
 
@@ -170,7 +171,7 @@ def test_each_robot_uses_only_its_half_of_the_gap(distance, v):
     new_v, _, _ = meeting(distance, 0.0, v, rig)
     path = naive_path(0.0, new_v, 0.0)
     moved, stopped = path[FINE, 0], path[-1, 0]
-    half = 0.5 * (distance - 2.0 * BODY.radius_m - rig.clearance)
+    half = 0.5 * (distance - 2.0 * BODY.radius_m - rig.guarding.clearance_m)
     assert stopped + (stopped - moved) <= half + 1e-3  # the braking distance is kept twice
     wanted = naive_path(0.0, v, 0.0)
     if 2.0 * wanted[-1, 0] - wanted[FINE, 0] < half - 1e-3:
@@ -178,9 +179,9 @@ def test_each_robot_uses_only_its_half_of_the_gap(distance, v):
 
 
 def test_a_neighbour_is_kept_off_even_when_its_returns_are_missing():
-    rows = Rows(rig_of())
-    rows.see((3, 0.36, 0.0, 0.0))
-    update_tracks(rows.percept, rows.memory, rows.rig, 0.0, 0.0)
+    rows = one_robot()
+    rows.see([seen(3, 0.36, 0.0)])
+    update_tracks(rows.percept, rows.shared, rows.rig, 0.0, 0.0)
     assert guarded(np.full(360, np.inf, np.float32), 0.0, 0.5, 0.0, rows=rows)[0] < 0.2
 
 
@@ -200,11 +201,11 @@ def test_adversarial_commands_never_touch_obstacles(name):
     smallest = math.inf
     for run in range(40):
         rows = np.column_stack([rng.uniform(-3, 3, (30, 2)), rng.uniform(0.05, 0.4, 30)])
-        rows = rows[np.hypot(rows[:, 0], rows[:, 1]) - rows[:, 2] > body.radius_m + rig.clearance]
-        sim, shared, _ = place_sim(
+        rows = rows[np.hypot(rows[:, 0], rows[:, 1]) - rows[:, 2] > body.radius_m + rig.guarding.clearance_m]
+        sim, swarm = place_sim(
             [(0.0, 0.0, rng.uniform(-3, 3))], world=circles_world(rows), rig=rig, seed=run
         )
-        smallest = min(smallest, closest(sim, shared, rig, 200, run % 3))
+        smallest = min(smallest, closest(sim, swarm, 200, run % 3))
     assert smallest > 0.0
     assert smallest < 0.05  # otherwise the adversary was too tame to show anything
 
@@ -219,8 +220,8 @@ def test_adversarial_commands_never_touch_walls():
     obstacles = [{"type": "wall", "points": box}, spike, shelf]
     world = compile_world(WorldSpec(obstacles=obstacles, bounds=(-2, -2, 2, 2)))
     for run in range(30):
-        sim, shared, _ = place_sim([(0.0, 0.0, rng.uniform(-3, 3))], world=world, rig=rig, seed=run)
-        assert closest(sim, shared, rig, 300, run % 3) > 0.0
+        sim, swarm = place_sim([(0.0, 0.0, rng.uniform(-3, 3))], world=world, rig=rig, seed=run)
+        assert closest(sim, swarm, 300, run % 3) > 0.0
 
 
 @pytest.mark.parametrize("robots", [2, 3])
@@ -235,10 +236,10 @@ def test_adversarial_robots_never_touch_each_other(name, robots):
         starts = []
         while len(starts) < robots:
             p = rng.uniform(-0.8, 0.8, 2)
-            if all(math.hypot(*(p - q[:2])) > 2.0 * body.radius_m + 2.0 * rig.clearance for q in starts):
+            if all(math.hypot(*(p - q[:2])) > 2.0 * body.radius_m + 2.0 * rig.guarding.clearance_m for q in starts):
                 starts.append((*p, rng.uniform(-3, 3)))
-        sim, shared, _ = place_sim(starts, world=world, rig=rig, seed=run)
-        smallest = min(smallest, closest(sim, shared, rig, 60, run % 3))
+        sim, swarm = place_sim(starts, world=world, rig=rig, seed=run)
+        smallest = min(smallest, closest(sim, swarm, 60, run % 3))
     assert smallest > 0.0
     assert smallest < 0.06
 
@@ -247,5 +248,5 @@ def test_a_robot_that_starts_within_its_clearance_gets_away_and_never_touches():
     rig = rig_of()
     world = circles_world([(0.0, 0.46, 0.3)])
     for run in range(20):
-        sim, shared, _ = place_sim([(0.0, 0.0, -0.5 * math.pi)], world=world, rig=rig, seed=run)
-        assert closest(sim, shared, rig, 30, 2) > 0.0
+        sim, swarm = place_sim([(0.0, 0.0, -0.5 * math.pi)], world=world, rig=rig, seed=run)
+        assert closest(sim, swarm, 30, 2) > 0.0

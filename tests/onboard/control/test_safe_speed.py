@@ -9,14 +9,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from helpers import rig_of
+from swarmscope.onboard.body import Body
 from swarmscope.onboard.control.safe_speed import safe_distance, safe_sector, safe_speed
 
-ANGLES = np.radians(np.arange(-180.0, 180.0))
-COS, SIN = np.cos(ANGLES), np.sin(ANGLES)
+RIG = rig_of(Body(v_max_mps=0.5, a_max_mps2=2.0))._replace(footprint=0.3)
+"""With 0.3 m for r_protect."""
 
 
-def speed(ranges, heading=0.0, r_protect=0.3, v_max=0.5, a_max=2.0, dt=0.2):
-    return safe_speed(np.asarray(ranges, np.float32), 0.0, COS, SIN, heading, r_protect, v_max, a_max, dt)
+def speed(ranges, heading=0.0, dt=0.2):
+    return safe_speed(np.asarray(ranges, np.float32), RIG, heading, dt)
 
 
 def scan(value=np.inf, **at):

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from helpers import circles_world, rig_of, scan_at
+from helpers import circles_world, make_sensor, rig_of, scan_at
 from swarmscope.onboard.perception.features import align_features, extrema, reconstruct
 from swarmscope.onboard.perception.filters import filter_padded, prepare_scan
 from swarmscope.onboard.sharing.message import MAX_FEATURES
@@ -24,9 +24,11 @@ def find(values, safe=None, wraps=True, room=MAX_FEATURES):
     """Extrema of a filtered scan as [(beam, distance)], beams counted from angle_min."""
     values = np.asarray(values, np.float32)
     increment = TWO_PI / len(values) if wraps else math.radians(1.0)
+    sensor = make_sensor(len(values), range_max=RANGE_MAX)
+    sensor = sensor._replace(angle_min=-math.pi, increment=increment, wraps=wraps)
     safe = np.ones(len(values), np.uint8) if safe is None else np.asarray(safe, np.uint8)
     angles, distances = np.full(room, np.nan), np.full(room, np.nan)
-    count = extrema(values, safe, -math.pi, increment, wraps, RANGE_MAX, angles, distances)
+    count = extrema(values, safe, sensor, angles, distances)
     assert np.isnan(angles[count:]).all()
     assert (np.diff(angles[:count]) > 0.0).all()
     beams = (angles[:count] + math.pi) / increment

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from helpers import make_sensor
 from swarmscope.onboard.network.local_map import (
     CELL_ANGLE,
     CELL_DISTANCE,
@@ -16,6 +17,7 @@ from swarmscope.onboard.network.local_map import (
     HIT,
     NOTHING,
     UNKNOWN,
+    Drawing,
     draw_map,
     encode_scan,
     hide_robot,
@@ -24,6 +26,7 @@ from swarmscope.onboard.network.local_map import (
 BEAMS = 360
 INCREMENT = 2.0 * math.pi / BEAMS
 MIDDLE = CELLS // 2
+SENSOR = make_sensor(BEAMS)
 
 
 def codes_of(ranges):
@@ -34,7 +37,7 @@ def codes_of(ranges):
 
 def picture(codes, target=0.0, radius=2.5, seen=2.5):
     out = np.full((2, CELLS, CELLS), 9, np.uint8)
-    draw_map(codes, -math.pi, INCREMENT, target, radius, seen, CELL_ANGLE, CELL_DISTANCE, out)
+    draw_map(codes, Drawing(-math.pi, INCREMENT, target, radius, seen), CELL_ANGLE, CELL_DISTANCE, out)
     return out
 
 
@@ -90,7 +93,7 @@ def test_a_robot_is_taken_out_but_not_what_stands_before_or_beside_it(bearing):
     ranges = np.where(off < math.asin(0.15 / 2.0) + 1e-6, 2.0 - 0.15, 4.0)
     ranges[np.argmin(off)] = 1.0  # a thin post in front of it
     codes = codes_of(ranges)
-    hide_robot(codes, -math.pi, INCREMENT, True, 2.0 * math.cos(bearing), 2.0 * math.sin(bearing), 0.15)
+    hide_robot(codes, SENSOR, 2.0 * math.cos(bearing), 2.0 * math.sin(bearing), 0.15)
     assert codes[np.argmin(off)] == 50
     hidden = codes == UNKNOWN
     assert hidden.sum() == (off < math.asin(0.15 / 2.0) + 1e-6).sum() - 1

@@ -11,28 +11,30 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from helpers import circles_world, make_sensor, rig_of, scan_at
+from swarmscope.onboard.perception.corridor import corridor_length
 from swarmscope.onboard.perception.safety import (
     BINS,
+    Rule,
     beam_of,
     blocking_half_angle,
-    corridor_length,
     reach_table,
     safe_directions,
 )
+from swarmscope.onboard.rig import AHEAD, ESCAPE, NARROW
 
 RANGE_MAX, L_TH, HALF = 5.0, 0.6, 30
 INCREMENT = math.radians(1.0)
-BEAM_ANGLES = -math.pi + INCREMENT * np.arange(360)
-COS, SIN = np.cos(BEAM_ANGLES), np.sin(BEAM_ANGLES)
+CIRCLE = make_sensor(360, range_max=RANGE_MAX)
 BIN = RANGE_MAX / BINS
 ROUNDED_L_TH = math.ceil(L_TH / BIN) * BIN
-SECTOR = reach_table(INCREMENT, RANGE_MAX, 0.0, L_TH, math.radians(HALF), 0.0, 0.0)
+SECTOR = reach_table(INCREMENT, RANGE_MAX, 0.0, Rule(L_TH, math.radians(HALF)))
 RULES = {
-    "directions": ((0.18, 0.6, 0.0, 2.0, 0.19), ((0.18, 0.6), (0.19, 2.0))),
-    "sector too": ((0.18, 0.6, math.radians(30), 2.0, 0.19), ((0.18, 0.6), (0.19, 2.0))),
-    "narrow": ((0.18, 1.2, 0.0, 0.0, 0.0), ((0.18, 1.2),)),
-    "large body": ((0.46, 0.83, 0.0, 3.0, 0.47), ((0.46, 0.83), (0.47, 3.0))),
+    "directions": ((0.18, Rule(0.6, 0.0, 2.0, 0.19)), ((0.18, 0.6), (0.19, 2.0))),
+    "sector too": ((0.18, Rule(0.6, math.radians(30), 2.0, 0.19)), ((0.18, 0.6), (0.19, 2.0))),
+    "narrow": ((0.18, Rule(1.2, 0.0, 0.0, 0.0)), ((0.18, 1.2),)),
+    "large body": ((0.46, Rule(0.83, 0.0, 3.0, 0.47)), ((0.46, 0.83), (0.47, 3.0))),
 }
+RIG = rig_of(sensor=CIRCLE)
 ranges_of = st.one_of(st.floats(0.015625, 6.0, width=32), st.just(math.inf))
 
 
@@ -41,9 +43,10 @@ def scans(beams):
 
 
 def safe_of(ranges, reach, wraps=True, range_min=0.0, range_max=RANGE_MAX):
+    sensor = CIRCLE._replace(beams=len(ranges), wraps=wraps, range_min=range_min, range_max=range_max)
     safe = np.full(len(ranges), 7, np.uint8)
     edges = np.full(len(ranges) + 1, 99, np.int16)
-    count = safe_directions(ranges, range_min, range_max, wraps, reach, edges, safe)
+    count = safe_directions(ranges, sensor, reach, edges, safe)
     assert count == safe.sum()
     return safe
 
@@ -82,7 +85,7 @@ def test_the_sector_rule_is_the_printed_filter(ranges):
 
 @given(scans(360), st.integers(0, 359))
 def test_a_full_circle_has_no_seam(ranges, turn):
-    reach = rig_of().reach[0]
+    reach = RIG.reach[AHEAD]
     assert (safe_of(np.roll(ranges, turn), reach) == np.roll(safe_of(ranges, reach), turn)).all()
 
 
@@ -131,7 +134,7 @@ def test_no_more_is_blocked_than_the_rule_says(s, bearing):
     """Directions beyond a return's half angle, and the rounding of one bin and one beam, stay safe."""
     rule = RULES["directions"][0]
     ranges = np.full(360, math.inf, np.float32)
-    beam = beam_of(bearing, -math.pi, INCREMENT, 360, True)
+    beam = beam_of(bearing, CIRCLE)
     ranges[beam] = s
     safe = safe_of(ranges, reach_table(INCREMENT, RANGE_MAX, *rule))
     half = blocking_half_angle(max(0.0, s - BIN), *rule)
@@ -143,26 +146,26 @@ def test_no_more_is_blocked_than_the_rule_says(s, bearing):
 
 
 @pytest.mark.parametrize("bad", [math.nan, 0.05, -math.inf])
-@pytest.mark.parametrize("level", [0, 1, 2])
+@pytest.mark.parametrize("level", [AHEAD, NARROW, ESCAPE])
 def test_an_invalid_beam_blocks_a_quarter_turn_to_either_side(bad, level):
     ranges = np.full(360, math.inf, np.float32)
     ranges[200] = bad
-    safe = safe_of(ranges, rig_of().reach[level], range_min=0.1)
+    safe = safe_of(ranges, RIG.reach[level], range_min=0.1)
     turn = np.abs((np.arange(360) - 200 + 180) % 360 - 180)
     assert (safe[turn <= 90] == 0).all()
     assert (safe[turn > 91] == 1).all()
 
 
 def test_all_beams_invalid_leaves_no_direction():
-    assert safe_of(np.full(360, math.nan, np.float32), rig_of().reach[0]).sum() == 0
+    assert safe_of(np.full(360, math.nan, np.float32), RIG.reach[AHEAD]).sum() == 0
 
 
 def test_open_space_is_safe_everywhere():
-    assert safe_of(np.full(360, math.inf, np.float32), rig_of().reach[0]).all()
-    assert safe_of(np.full(360, 5.0, np.float32), rig_of().reach[0]).all()
+    assert safe_of(np.full(360, math.inf, np.float32), RIG.reach[AHEAD]).all()
+    assert safe_of(np.full(360, 5.0, np.float32), RIG.reach[AHEAD]).all()
 
 
-@pytest.mark.parametrize("level", [0, 1, 2])
+@pytest.mark.parametrize("level", [AHEAD, NARROW, ESCAPE])
 @pytest.mark.parametrize("fov_deg", [120, 180, 270])
 def test_directions_at_the_border_of_the_field_of_view_are_not_safe(fov_deg, level):
     """What is beside the outermost beam has not been seen: alpha/2 of the published robot is 30 degrees."""
@@ -179,27 +182,28 @@ def test_gaps_narrower_than_the_body_are_closed_and_wider_ones_open():
     for gap, free in ((0.30, False), (0.35, False), (0.40, True), (0.60, True)):
         half = 0.5 * gap
         scan = scan_at(circles_world([(0.5, half + 0.2, 0.2), (0.5, -half - 0.2, 0.2)]), rig)
-        assert bool(safe_of(scan, rig.reach[1])[180]) is free
+        assert bool(safe_of(scan, rig.reach[NARROW])[180]) is free
 
 
 @given(st.floats(-20.0, 20.0))
 def test_beam_of_is_the_nearest_beam(bearing):
-    n = beam_of(bearing, -math.pi, INCREMENT, 360, True)
+    n = beam_of(bearing, CIRCLE)
     error = (bearing - (-math.pi + n * INCREMENT) + math.pi) % (2.0 * math.pi) - math.pi
     assert abs(error) <= 0.5 * INCREMENT + 1e-9
 
 
 def test_beam_of_outside_the_field_of_view():
-    assert beam_of(math.radians(61), math.radians(-60), INCREMENT, 121, False) == -1
-    assert beam_of(math.radians(-61), math.radians(-60), INCREMENT, 121, False) == -1
-    assert beam_of(math.radians(60), math.radians(-60), INCREMENT, 121, False) == 120
+    sensor = CIRCLE._replace(beams=121, angle_min=math.radians(-60), wraps=False)
+    assert beam_of(math.radians(61), sensor) == -1
+    assert beam_of(math.radians(-61), sensor) == -1
+    assert beam_of(math.radians(60), sensor) == 120
 
 
 @settings(max_examples=60)
 @given(scans(360), st.floats(-math.pi, math.pi), st.floats(0.05, 3.0))
 def test_corridor_length_is_how_far_the_disc_gets(ranges, bearing, limit):
     half_width = 0.18
-    free = corridor_length(ranges, 0.0, COS, SIN, bearing, half_width, limit)
+    free = corridor_length(ranges, RIG, bearing, half_width, limit)
     angles = -math.pi + INCREMENT * np.arange(360)
     seen = np.isfinite(ranges)
     s = ranges[seen].astype(float)
@@ -216,5 +220,6 @@ def test_corridor_length_is_how_far_the_disc_gets(ranges, bearing, limit):
 def test_an_invalid_beam_closes_the_corridor_ahead_only():
     ranges = np.full(360, math.inf, np.float32)
     ranges[180] = math.nan
-    assert corridor_length(ranges, 0.1, COS, SIN, 0.0, 0.18, 2.0) == 0.0
-    assert corridor_length(ranges, 0.1, COS, SIN, math.pi, 0.18, 2.0) == 2.0
+    rig = rig_of(sensor=make_sensor(range_min=0.1))
+    assert corridor_length(ranges, rig, 0.0, 0.18, 2.0) == 0.0
+    assert corridor_length(ranges, rig, math.pi, 0.18, 2.0) == 2.0

@@ -7,10 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from helpers import DT, Rows, circle, circles_world, place_scenario, rig_of, run_scenario, scan_at, wall
-from swarmscope.onboard.planning import dh_bug
-from swarmscope.onboard.reasons import DECIDE, YIELD
-from swarmscope.onboard.planning.dh_bug import (
+from helpers import DT, circle, circles_world, one_robot, place_scenario, run_scenario, scan_at, seen, tick, wall
+from swarmscope.onboard.deciding.bug import (
     AT_GOAL,
     KEY_POINT,
     MODE_A,
@@ -22,42 +20,35 @@ from swarmscope.onboard.planning.dh_bug import (
     MODE_NAMES,
     STANDBY,
     STATES,
-    TURN_LEFT,
-    TURN_NEAREST,
-    TURN_RANDOM,
-    TURN_RIGHT,
-    Params,
     toss,
 )
+from swarmscope.onboard.planning.dh_bug import TURN_LEFT, TURN_NEAREST, TURN_RANDOM, TURN_RIGHT, Params
+from swarmscope.onboard.reasons import DECIDE, YIELD
 
 BIG = [(2.3, 0.0, 2.0)]
 """0.3 m ahead and so wide that no direction within 80 degrees of the goal's is safe."""
 
 
-class Robot(Rows):
+class Robot:
     """One robot with a goal 8 m ahead, stepped by hand."""
 
     def __init__(self, goal=8.0, **params):
-        super().__init__(rig_of())
-        self.params = Params(**params)
-        self.memories = dh_bug.new_memory(1)
-        self.percepts["goal_distance"] = goal
+        self.rows = one_robot(planner="dh-bug", **params)
+        self.rows.fill(goal_distance=goal)
+        self.memory, self.decision, self.shared = self.rows.memory, self.rows.decision, self.rows.shared
 
     def face(self, obstacles, x=0.0, yaw=0.0):
-        self.ranges[0] = scan_at(circles_world(obstacles), self.rig, x, 0.0, yaw)
-        self.percepts["compass"] = yaw
-        self.percepts["goal_bearing"] = -yaw
+        self.rows.scan[:] = scan_at(circles_world(obstacles), self.rows.rig, x, 0.0, yaw)
+        self.rows.fill(compass=yaw, goal_bearing=-yaw)
         return self
 
     def step(self):
-        arrays = (self.ranges, self.percepts, self.shared, self.memories, self.decisions, self.scratch)
-        dh_bug.step_all(0, 1, *arrays, self.rig, self.params)
-        self.percepts["now_s"] += DT
+        tick(self.rows)
         return self
 
     @property
     def mode(self):
-        return int(self.memories["mode"][0])
+        return int(self.memory["mode"])
 
 
 def run_one(obstacles, start=(-3.0, 0.0, 0.0), goal=(3.0, 0.0), **params):
@@ -89,7 +80,7 @@ def test_a_robot_turns_to_its_goal_before_it_drives_there():
 def test_without_the_sector_a_gap_is_taken_that_the_body_fits_through():
     gap = [(0.5, 1.25, 1.0), (0.5, -1.25, 1.0)]  # 0.5 m wide, the body and its margins need 0.38 m
     robot = Robot(sector=0).face(gap).step()
-    assert robot.mode == MODE_B and robot.decisions["fused"][0] == 0
+    assert robot.mode == MODE_B and robot.decision["fused"] == 0
     robot = Robot(sector=1).face(gap).step()
     assert robot.mode != MODE_B
     closed = Robot(sector=0).face([(0.5, 1.15, 1.0), (0.5, -1.15, 1.0)]).step()
@@ -120,14 +111,14 @@ def test_at_a_key_point_it_turns_and_then_follows(turn, side, turns, follows):
 def test_a_following_ends_nearer_the_goal_with_the_goal_on_the_free_side():
     robot = Robot(turn=TURN_LEFT).face(BIG).step()
     robot.face([], yaw=0.3).step()
-    assert robot.memories["side"][0] == 1  # as far from the goal as at the key point
-    robot.percepts["goal_distance"] = 7.9
-    robot.memories["heading"] = 0.3
+    assert robot.memory["side"] == 1  # as far from the goal as at the key point
+    robot.rows.fill(goal_distance=7.9)
+    robot.memory["heading"] = 0.3
     robot.step()
-    assert robot.memories["side"][0] == 1  # the goal is on the obstacle's side
-    robot.memories["heading"] = -0.3
+    assert robot.memory["side"] == 1  # the goal is on the obstacle's side
+    robot.memory["heading"] = -0.3
     robot.step()
-    assert robot.memories["side"][0] == 0
+    assert robot.memory["side"] == 0
     assert robot.mode in (MODE_A, MODE_B)
 
 
@@ -164,7 +155,7 @@ def test_the_toss_is_even_and_the_same_every_time():
 def test_an_oracle_is_listened_to_only_if_told_to():
     for told, side in ((0, 1), (1, -1)):
         robot = Robot(turn=TURN_LEFT, told=told)
-        robot.percepts["told_side"] = -1
+        robot.memory["told"] = -1
         assert robot.face(BIG).step().decision["side"] == side
 
 
@@ -178,15 +169,15 @@ def test_out_of_a_u_trap(turn):
 def test_being_back_at_a_pose_of_the_same_following_is_a_loop():
     """Round a disc with the goal's distance never falling: after one round the robot faces the goal anew."""
     robot = Robot(turn=TURN_LEFT).face(BIG).step()
-    robot.percepts["speed"] = 0.4
+    robot.rows.fill(speed=0.4)
     robot.face(BIG, yaw=1.5)
-    robot.percepts["goal_distance"] = 9.0
+    robot.rows.fill(goal_distance=9.0)
     looped = None
     for k in range(100):
         angle = 2.0 * math.pi * k / 40
-        robot.memory["x"], robot.memory["y"] = math.cos(angle), math.sin(angle)
+        robot.shared["x"], robot.shared["y"] = math.cos(angle), math.sin(angle)
         robot.step()
-        if robot.memories["looped"][0]:
+        if robot.memory["looped"]:
             looped = k
             break
     assert looped in (40, 41)
@@ -194,12 +185,12 @@ def test_being_back_at_a_pose_of_the_same_following_is_a_loop():
 
 def test_turning_on_the_spot_for_more_than_390_degrees_is_a_loop():
     robot = Robot(turn=TURN_LEFT).face(BIG).step()
-    robot.percepts["odom_yaw"] = math.radians(39.5)
+    robot.rows.fill(odom_yaw=math.radians(39.5))
     for _ in range(9):
         robot.step()
-    assert not robot.memories["looped"][0]
+    assert not robot.memory["looped"]
     robot.step()
-    assert robot.memories["looped"][0]
+    assert robot.memory["looped"]
 
 
 def test_the_robot_with_the_smaller_address_goes_first_and_nobody_waits_for_ever():
@@ -207,12 +198,12 @@ def test_the_robot_with_the_smaller_address_goes_first_and_nobody_waits_for_ever
     waits = {}
     for own in (0, 9):
         robot = Robot()
-        robot.percepts["id"] = own
+        robot.rows.fill(id=own)
         states = []
         for k in range(30):
-            robot.see((5, 0.8 + 0.04 * math.sin(9.0 * k) - 0.001 * k, 0.0, math.pi))
-            robot.memory["track_moved_s"][:] = robot.percept["now_s"]
-            robot.memory["track_vx"][:] = -0.5
+            robot.rows.see([seen(5, 0.8 + 0.04 * math.sin(9.0 * k) - 0.001 * k, 0.0, math.pi)])
+            robot.shared["track_moved_s"][:] = robot.rows.percept["now_s"]
+            robot.shared["track_vx"][:] = -0.5
             robot.step()
             states.append(int(robot.decision["state"]))
         waits[own] = np.array(states) == YIELD

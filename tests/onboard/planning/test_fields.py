@@ -9,7 +9,8 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from helpers import Rows, rig_of
+from helpers import one_robot
+from swarmscope.onboard.deciding.choosing import choose_side, own_probability
 from swarmscope.onboard.deciding.fields import (
     following_probability,
     fuse,
@@ -20,7 +21,7 @@ from swarmscope.onboard.deciding.fields import (
     sigmoid,
     yields_to,
 )
-from swarmscope.onboard.deciding.choosing import choose_side, own_probability
+from swarmscope.onboard.view import Table
 
 TWO_PI = 2.0 * math.pi
 SIGMA = 0.9
@@ -119,42 +120,33 @@ def as_arrays(pairs, mirror=False):
     return angles, distances, len(pairs)
 
 
+def as_table(pairs, mirror=False):
+    angles, distances, count = as_arrays(pairs, mirror)
+    return Table(angles, distances), count
+
+
 @given(feature_lists, st.floats(-1.0, 1.0))
 def test_the_mirrored_scene_has_the_opposite_own_probability(pairs, bias):
-    p = own_probability(*as_arrays(pairs), HALF_ALPHA, bias, False)
-    assert own_probability(*as_arrays(pairs, True), HALF_ALPHA, -bias, False) == pytest.approx(1.0 - p, abs=1e-9)
+    p = own_probability(*as_table(pairs), HALF_ALPHA, bias, False)
+    assert own_probability(*as_table(pairs, True), HALF_ALPHA, -bias, False) == pytest.approx(1.0 - p, abs=1e-9)
 
 
 def decide(pairs, neighbours, goal_bearing=0.0, compass=0.0, mirror=False, w_i=1.0, bias=0.0, polygon=False):
     """Robot 0 with features ``pairs``, neighbours (distance, bearing, features), in the compass frame."""
-    rows = Rows(rig_of())
+    rows = one_robot()
     sign = -1.0 if mirror else 1.0
-    rows.percepts["compass"], rows.percepts["goal_bearing"] = sign * compass, sign * goal_bearing
+    rows.fill(compass=sign * compass, goal_bearing=sign * goal_bearing)
     for slot, (distance, bearing, heard) in enumerate(neighbours):
-        row = rows.shared[0]
+        row = rows.shared
         row["track_id"][slot], row["heard_id"][slot] = 10 + slot, 10 + slot
         row["track_x"][slot] = distance * math.cos(sign * bearing)
         row["track_y"][slot] = distance * math.sin(sign * bearing)
         angles, distances, count = as_arrays(heard, mirror)
         row["heard_angle"][slot], row["heard_distance"][slot], row["heard_n"][slot] = angles, distances, count
-    angles, distances, count = as_arrays(pairs, mirror)
-    out = np.zeros((2, 16))
-    side = choose_side(
-        rows.percept,
-        rows.memory,
-        rows.decision,
-        rows.rig,
-        w_i,
-        sign * bias,
-        polygon,
-        angles,
-        distances,
-        count,
-        out[0],
-        out[1],
-    )
-    row = rows.decisions[0]
-    return side, float(row["p_self"]), float(row["p_left"]), int(row["heard"])
+    see = rows.view
+    see.own.angles[:], see.own.distances[:], count = as_arrays(pairs, mirror)
+    side = choose_side(see, count, w_i, sign * bias, polygon)
+    return side, rows.said("p_self"), rows.said("p_left"), rows.said("heard")
 
 
 peers = st.lists(st.tuples(st.floats(0.5, 3.5), st.floats(-3.0, 3.0), feature_lists), max_size=4)
@@ -225,8 +217,8 @@ def test_the_polygon_reading_takes_triangles_and_chords():
     _, p_self, p_left, _ = decide(pairs, [(1.5, 0.4, heard)], polygon=True)
     angles, distances, count = as_arrays(pairs)
     distances[:count] = distances[:count] / 5.0 + 1.0
-    assert p_self == pytest.approx(own_probability(angles, distances, count, HALF_ALPHA, 0.0, True))
-    assert p_self != pytest.approx(own_probability(angles, distances, count, HALF_ALPHA, 0.0, False), abs=1e-4)
+    assert p_self == pytest.approx(own_probability(Table(angles, distances), count, HALF_ALPHA, 0.0, True))
+    assert p_self != pytest.approx(own_probability(Table(angles, distances), count, HALF_ALPHA, 0.0, False), abs=1e-4)
     border = 1.6 * math.cos(0.6) / math.cos(HALF_ALPHA)  # the farther of the two borders of each quadrant
     force = interaction_force(1.5, SIGMA, 1.0)
     follow = sigmoid(2.0 * border - 2.0 * (1.95 / 5.0 + 1.0))

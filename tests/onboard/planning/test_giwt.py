@@ -9,12 +9,7 @@ import onnxruntime
 import pytest
 
 from giwt_models import make_model
-from helpers import DT, Rows, circle, circles_world, place_scenario, rig_of, run_scenario, scan_at
-from swarmscope.onboard.percept import MAX_OUTBOX
-from swarmscope.onboard.network.local_map import CELL_ANGLE, CELL_DISTANCE, draw_map, encode_scan, hide_robot
-from swarmscope.onboard.planning import giwt, giwt_cnn
-from swarmscope.onboard.reasons import R_ALONE, R_ANSWERS, R_FUSED
-from swarmscope.onboard.planning._giwt import Params
+from helpers import DT, circle, circles_world, place_scenario, rig_of, run_scenario, scan_at
 from swarmscope.onboard.network.graph import (
     OWN_CELL,
     VIEW_M,
@@ -23,14 +18,27 @@ from swarmscope.onboard.network.graph import (
     quantise,
     restore,
 )
+from swarmscope.onboard.network.local_map import (
+    CELL_ANGLE,
+    CELL_DISTANCE,
+    Drawing,
+    draw_map,
+    encode_scan,
+    hide_robot,
+)
+from swarmscope.onboard.percept import MAX_OUTBOX
+from swarmscope.onboard.planners import load_planner
+from swarmscope.onboard.reasons import R_ALONE, R_ANSWERS, R_FUSED
 from swarmscope.onboard.sharing.message import (
     KIND_DIRECTED_REQUEST,
     KIND_LATENT,
     OK,
+    Head,
     decode,
     encode_directed_request,
     encode_latent,
 )
+from swarmscope.onboard.view import new_swarm
 
 GOAL = 0.3
 """Direction of A's goal, compass frame [rad]; byte 12."""
@@ -53,13 +61,17 @@ def seen_from(here, there):
     return c * dx + s * dy, c * dy - s * dx, there[2] - here[2]
 
 
-class Robots(Rows):
+class Robots:
     """A in front of an obstacle, and B; packets are carried by hand."""
 
     def __init__(self, planner, poses=(A, B), **params):
-        super().__init__(rig_of(), len(poses))
-        self.planner, self.params = planner, Params(**params)
+        self.rig = rig_of()
+        self.swarm = new_swarm(len(poses), self.rig)
+        self.planner, self.params = planner, planner.params(params)
         self.memories = planner.new_memory(len(poses))
+        self.percepts, self.shared, self.decisions = self.swarm.percepts, self.swarm.shared, self.swarm.decisions
+        self.ranges = self.swarm.scans
+        self.percepts["dt_s"] = DT
         self.percepts["now_s"] = 10.0
         for i, pose in enumerate(poses):
             self.ranges[i] = scan_at(circles_world(WORLD), self.rig, *pose)
@@ -75,8 +87,7 @@ class Robots(Rows):
                 self.percepts["neighbour_yaw"][i, k] = yaw
 
     def step(self):
-        arrays = (self.ranges, self.percepts, self.shared, self.memories, self.decisions, self.scratch)
-        self.planner.step_all(0, len(self.percepts), *arrays, self.rig, self.params)
+        self.planner.step_all(0, len(self.percepts), self.swarm, self.memories, self.params)
         self.percepts["now_s"] += DT
         self.percepts["n_packets"] = 0
         return self
@@ -110,13 +121,13 @@ class Robots(Rows):
 
 
 def planner_of(model):
-    return giwt.with_model(model)
+    return load_planner("giwt").with_model(model)
 
 
 def answer_of(sender, seq, reply_to, codes=None):
     out = np.zeros(138, np.uint8)
     codes = np.full(128, 5, np.uint8) if codes is None else codes
-    return out[: encode_latent(sender, seq, reply_to, codes, 150, out)].tobytes()
+    return out[: encode_latent(Head(sender, seq, reply_to), codes, 150, out)].tobytes()
 
 
 def picture_of(robots, i, pose, other, target):
@@ -125,10 +136,10 @@ def picture_of(robots, i, pose, other, target):
     codes = np.zeros(sensor.beams, np.uint8)
     encode_scan(robots.ranges[i], codes)
     x, y, _ = seen_from(pose, other)
-    hide_robot(codes, sensor.angle_min, sensor.increment, sensor.wraps, x, y, 0.15)
+    hide_robot(codes, sensor, x, y, 0.15)
     out = np.zeros((2, 101, 101), np.uint8)
-    towards = target - pose[2]
-    draw_map(codes, sensor.angle_min, sensor.increment, towards, VIEW_M, VIEW_M, CELL_ANGLE, CELL_DISTANCE, out)
+    drawing = Drawing(sensor.angle_min, sensor.increment, target - pose[2], VIEW_M, VIEW_M)
+    draw_map(codes, drawing, CELL_ANGLE, CELL_DISTANCE, out)
     return out[None].astype(np.float32)
 
 
@@ -307,7 +318,7 @@ def test_after_a_loop_the_side_is_tossed_for(model):
 
 
 def test_a_network_of_the_own_scan_only_asks_nobody(tmp_path):
-    robots = Robots(giwt_cnn.with_model(make_model(tmp_path / "m", network="cnn"))).step()
+    robots = Robots(load_planner("giwt-cnn").with_model(make_model(tmp_path / "m", network="cnn"))).step()
     assert (robots.decisions["fused"][0], robots.decisions["n_out"][0]) == (1, 0)
 
 

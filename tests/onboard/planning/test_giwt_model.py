@@ -11,8 +11,10 @@ from onnx import TensorProto
 
 from giwt_models import decider, encoder, make_model, port, write_card
 from swarmscope.errors import InputFileError, MissingExtraError
-from swarmscope.onboard.planning import giwt
 from swarmscope.onboard.network.model import load_network, read_card
+from swarmscope.onboard.planners import load_planner
+
+GIWT = load_planner("giwt")
 
 
 @pytest.fixture
@@ -25,7 +27,7 @@ def load(folder):
 
 
 def refused(folder, words):
-    for check in (lambda: load(folder), lambda: giwt.with_model(folder).check_available()):
+    for check in (lambda: load(folder), lambda: GIWT.with_model(folder).check_available()):
         with pytest.raises(InputFileError, match=words) as error:
             check()
         assert "\n" not in str(error.value)
@@ -40,7 +42,7 @@ def test_a_whole_model_loads_once(folder):
     network = load(folder)
     assert network.encode(np.zeros((3, 2, 101, 101), np.float32)).shape == (3, 128)
     assert load(folder) is network
-    giwt.with_model(folder).check_available()
+    GIWT.with_model(folder).check_available()
 
 
 def test_the_radius_of_the_pictures_is_the_models(folder):
@@ -50,10 +52,10 @@ def test_the_radius_of_the_pictures_is_the_models(folder):
 
 
 def test_another_model_at_the_same_place_is_another_model(folder):
-    first, state = load(folder), giwt.with_model(folder).model_state()
+    first, state = load(folder), GIWT.with_model(folder).model.state()
     make_model(folder, seed=1)
     assert load(folder) is not first
-    assert giwt.with_model(folder).model_state() != state == read_card(make_model(folder))["sha256"]
+    assert GIWT.with_model(folder).model.state() != state == read_card(make_model(folder))["sha256"]
 
 
 def test_a_missing_folder_or_file(folder, tmp_path):
@@ -97,7 +99,7 @@ def test_a_torn_file(folder):
 def rejected(folder, words):
     """The card is right and the file is what it names, but no such network."""
     write_card(folder)
-    giwt.with_model(folder).check_available()
+    GIWT.with_model(folder).check_available()
     with pytest.raises(InputFileError, match=words) as error:
         load(folder)
     assert "\n" not in str(error.value)
@@ -125,6 +127,6 @@ def test_without_onnx_runtime_the_extra_is_named(folder, monkeypatch):
         return load_module(name, *rest)
 
     monkeypatch.setattr(builtins, "__import__", without)
-    for check in (lambda: load(folder), giwt.check_available):
+    for check in (lambda: load(folder), GIWT.check_available):
         with pytest.raises(MissingExtraError, match=r"swarmscope\[giwt\]"):
             check()

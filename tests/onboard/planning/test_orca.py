@@ -9,11 +9,12 @@ import threading
 import numpy as np
 import pytest
 
-from helpers import DT, Rows, circle, circles_world, place_scenario, rig_of, run_scenario, scan_at, wall
+from helpers import circle, circles_world, one_robot, place_scenario, rig_of, run_scenario, scan_at, seen, tick, wall
 from swarmscope.errors import MissingExtraError
 from swarmscope.geometry import point_segment_distance
-from swarmscope.onboard.planning import orca
+from swarmscope.onboard.perception.segments import LINE_ERROR, MAX_LINES
 from swarmscope.onboard.planners import planner_names
+from swarmscope.onboard.planning import orca
 from swarmscope.scenarios.read import parse_scenario
 from swarmscope.scenarios.to_kernels import make_setting, make_setup
 from swarmscope.sim.loop import run
@@ -40,25 +41,17 @@ def assert_all_arrive(trace):
     assert robots["min_clearance"].min() > 0.0
 
 
-class Robot(Rows):
+def robot_at(ranges, goal=(5.0, 0.0), **params):
     """One robot that has made a step in front of what ``ranges`` shows."""
+    robot = one_robot(planner="orca", **params)
+    robot.scan[:] = ranges
+    robot.fill(goal_bearing=goal[1], goal_distance=goal[0])
+    tick(robot)
+    return robot
 
-    def __init__(self, ranges, goal=(5.0, 0.0), **params):
-        super().__init__(rig_of())
-        self.ranges[0] = ranges
-        self.percepts["goal_bearing"], self.percepts["goal_distance"] = goal[1], goal[0]
-        self.memories = orca.new_memory(1)
-        self.params = orca.Params(**params)
-        self.step()
 
-    def step(self):
-        arrays = (self.ranges, self.percepts, self.shared, self.memories, self.decisions, self.scratch)
-        orca.step_all(0, 1, *arrays, self.rig, self.params)
-        self.percepts["now_s"] += DT
-
-    @property
-    def lines(self):
-        return self.memories["lines"][0, : self.memories["lines_n"][0]].astype(float)
+def lines_of(robot):
+    return robot.memory["lines"][: robot.memory["lines_n"]].astype(float)
 
 
 def test_two_robots_head_on_pass_each_other():
@@ -68,13 +61,13 @@ def test_two_robots_head_on_pass_each_other():
 
 
 def test_a_robot_gives_way_by_half_of_what_is_needed():
-    robot = Robot(np.full(360, np.inf))
+    robot = robot_at(np.full(360, np.inf))
     for k in range(4):  # somebody comes towards us, a little to the left
-        robot.see((7, 2.2 - 0.1 * k, 0.05, math.pi))
-        robot.step()
-    assert robot.memories["others_n"][0] == 1
-    assert robot.memories["others"][0, 0, 1, 0] == pytest.approx(-0.5, abs=0.05)
-    assert robot.decisions["heading"][0] < -0.02
+        robot.see([seen(7, 2.2 - 0.1 * k, 0.05, math.pi)])
+        tick(robot)
+    assert robot.memory["others_n"] == 1
+    assert robot.memory["others"][0, 1, 0] == pytest.approx(-0.5, abs=0.05)
+    assert robot.said("heading") < -0.02
 
 
 def test_a_disc_in_the_way_is_passed():
@@ -108,32 +101,32 @@ def test_the_way_through_a_door_that_just_fits():
 
 @pytest.mark.parametrize("trees", [[(0.9, 0.1, 0.3)], [(0.8, 0.3, 0.2), (0.7, -0.5, 0.25), (-0.6, 0.2, 0.3)]])
 def test_every_return_in_reach_lies_on_a_segment(trees):
-    robot = Robot(scan_at(circles_world(trees), rig_of()))
-    assert 0 < len(robot.lines) <= orca.MAX_LINES
-    ranges, rig = robot.ranges[0], robot.rig
+    robot = robot_at(scan_at(circles_world(trees), rig_of()))
+    assert 0 < len(lines_of(robot)) <= MAX_LINES
+    ranges, rig = robot.scan, robot.rig
     reach = rig.body.v_max_mps * robot.params.obstacle_horizon_s + rig.body.radius_m + robot.params.margin
     near = [n for n in range(360) if ranges[n] < reach]
     assert near
     for n in near:
         x, y = float(ranges[n] * rig.cos[n]), float(ranges[n] * rig.sin[n])
-        away = min(point_segment_distance(x, y, *a, *b) for a, b in robot.lines)
-        assert away <= orca.LINE_ERROR + 1e-5
+        away = min(point_segment_distance(x, y, *a, *b) for a, b in lines_of(robot))
+        assert away <= LINE_ERROR + 1e-5
 
 
 @pytest.mark.parametrize(("gap", "closed"), [(0.3, True), (0.45, False)])
 def test_a_gap_too_narrow_for_the_body_is_closed(gap, closed):
     half = 0.5 * gap + 0.2
-    robot = Robot(scan_at(circles_world([(0.6, half, 0.2), (0.6, -half, 0.2)]), rig_of()))
-    crossing = [a[1] * b[1] < 0.0 for a, b in robot.lines]
+    robot = robot_at(scan_at(circles_world([(0.6, half, 0.2), (0.6, -half, 0.2)]), rig_of()))
+    crossing = [a[1] * b[1] < 0.0 for a, b in lines_of(robot)]
     assert any(crossing) == closed
 
 
 def test_a_crowded_scan_is_made_coarser_until_it_fits():
     ranges = np.full(360, 0.54, np.float32)
     ranges[::2] = 0.5
-    robot = Robot(ranges)
-    assert 6 < len(robot.lines) <= orca.MAX_LINES
-    assert robot.decisions["v"][0] < 0.5
+    robot = robot_at(ranges)
+    assert 6 < len(lines_of(robot)) <= MAX_LINES
+    assert robot.said("v") < 0.5
 
 
 def test_the_same_bytes_every_time_with_any_number_of_threads():

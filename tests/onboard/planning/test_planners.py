@@ -13,11 +13,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from giwt_models import make_model
-from helpers import DT, Rows, circles_world, mirrored, place_scenario, rig_of, run_scenario, scan_at
+from helpers import DT, circles_world, mirrored, one_robot, place_scenario, rig_of, run_scenario, scan_at, seen, tick
 from swarmscope.onboard.percept import MAX_OUTBOX, PERCEPT
 from swarmscope.onboard.planners import load_planner, planner_names
 from swarmscope.onboard.reasons import ARRIVED, REASON_NAMES, STATE_NAMES
 from swarmscope.onboard.sharing.message import OK, decode
+from swarmscope.onboard.view import arrays_of, new_swarm
 
 PLANNERS = planner_names()
 MEMORY_LIMIT = 14_900
@@ -31,8 +32,8 @@ every_planner = pytest.mark.parametrize("name", PLANNERS)
 @cache
 def model_of(name):
     """The folder of a network with random weights, None for planners without a network."""
-    networks = getattr(getattr(load_planner(name), "PLANNER", None), "networks", None)
-    return networks and make_model(Path(TEMPORARY.name) / name, network=min(networks))
+    model = load_planner(name).model
+    return model and make_model(Path(TEMPORARY.name) / name, network=min(model.networks))
 
 
 @cache
@@ -42,118 +43,105 @@ def usable(name):
     return planner if model is None else planner.with_model(model)
 
 
-class Robots(Rows):
-    """Rows of robots with a planner's memory."""
-
-    def __init__(self, name, robots=1, rig=None):
-        super().__init__(rig or rig_of(), robots)
-        self.planner = usable(name)
-        self.params = self.planner.Params()
-        self.memories = self.planner.new_memory(robots)
-        self.percepts["goal_distance"] = 5.0
-
-    def step(self, first=0, last=None):
-        last = len(self.percepts) if last is None else last
-        arrays = (self.ranges, self.percepts, self.shared, self.memories, self.decisions, self.scratch)
-        self.planner.step_all(first, last, *arrays, self.rig, self.params)
-        self.percepts["now_s"] += DT
-        return self
-
-    def command(self):
-        return float(self.decisions["v"][0]), float(self.decisions["w"][0])
-
-    def check(self):
-        """Assert what holds after any step."""
-        d, body = self.decisions, self.rig.body
-        assert np.isfinite(d["v"]).all()
-        assert np.isfinite(d["w"]).all()
-        assert ((d["v"] >= 0.0) & (d["v"] <= body.v_max_mps + 1e-9)).all()
-        assert (np.abs(d["w"]) <= body.w_max_radps + 1e-9).all()
-        assert np.isfinite(d["heading"]).all()
-        assert (d["state"] < len(STATE_NAMES)).all()
-        assert (d["reason"] < len(REASON_NAMES)).all()
-        assert np.isin(d["side"], (-1, 0, 1)).all()
-        assert ((d["n_out"] >= 0) & (d["n_out"] <= MAX_OUTBOX)).all()
-        for i in range(len(d)):
-            for k in range(d["n_out"][i]):
-                assert decode(d["out"][i, k], int(d["out_length"][i, k]), np.zeros(5, np.int64)) == OK
-        for p in (d["p_self"], d["p_left"]):
-            assert (np.isnan(p) | ((p >= 0.0) & (p <= 1.0))).all()
+def robot_of(name):
+    """A robot of the planner, its goal 5 m ahead."""
+    robot = one_robot(planner=usable(name))
+    robot.fill(goal_distance=5.0)
+    return robot
 
 
-def random_scene(robots, seed, mirror=False):
-    """Random trees, goal and neighbours for robot 0."""
+def three_of(name):
+    """Rows of three robots, planner memory and parameters, in front of something different each."""
+    planner, swarm = usable(name), new_swarm(3, rig_of())
+    swarm.percepts["dt_s"], swarm.percepts["goal_distance"] = DT, 5.0
+    return planner, swarm, planner.new_memory(3), planner.params()
+
+
+def command(robot):
+    return robot.said("v"), robot.said("w")
+
+
+def step(robot):
+    """Make one tick and assert what holds after any; return the robot."""
+    tick(robot)
+    d, body = robot.decision, robot.rig.body
+    assert np.isfinite(d["v"])
+    assert np.isfinite(d["w"])
+    assert 0.0 <= d["v"] <= body.v_max_mps + 1e-9
+    assert np.abs(d["w"]) <= body.w_max_radps + 1e-9
+    assert np.isfinite(d["heading"])
+    assert d["state"] < len(STATE_NAMES)
+    assert d["reason"] < len(REASON_NAMES)
+    assert d["side"] in (-1, 0, 1)
+    assert 0 <= d["n_out"] <= MAX_OUTBOX
+    for k in range(d["n_out"]):
+        assert decode(d["out"][k], int(d["out_length"][k]), np.zeros(5, np.int64)) == OK
+    for p in (d["p_self"], d["p_left"]):
+        assert np.isnan(p) or 0.0 <= p <= 1.0
+    return robot
+
+
+def random_scene(name, seed, mirror=False):
+    """A robot among random trees with a random goal."""
+    robot = robot_of(name)
     rng = np.random.default_rng(seed)
     trees = np.column_stack([rng.uniform(-3, 3, (15, 2)), rng.uniform(0.1, 0.35, 15)])
     trees = trees[np.hypot(trees[:, 0], trees[:, 1]) - trees[:, 2] > 0.25]
     goal, speed = rng.uniform(-1.0, 1.0), rng.uniform(0.0, 0.2)
-    sign = -1.0 if mirror else 1.0
-    ranges = scan_at(circles_world(trees), robots.rig)
-    robots.ranges[0] = mirrored(ranges) if mirror else ranges
-    robots.percepts["goal_bearing"][0] = sign * goal
-    robots.percepts["speed"][0] = speed
-    return robots
+    ranges = scan_at(circles_world(trees), robot.rig)
+    robot.scan[:] = mirrored(ranges) if mirror else ranges
+    robot.fill(goal_bearing=-goal if mirror else goal, speed=speed)
+    return robot
 
 
 @every_planner
 @settings(max_examples=40)
 @given(seed=st.integers(0, 2**31))
 def test_outputs_are_finite_and_within_limits(name, seed):
-    robots = random_scene(Robots(name), seed)
+    robot = random_scene(name, seed)
     rng = np.random.default_rng(seed)
     for _ in range(10):
-        robots.see(*((k + 1, *rng.uniform(-3, 3, 2), rng.uniform(-3, 3)) for k in range(rng.integers(0, 4))))
-        robots.percepts["odom_x"], robots.percepts["compass"] = rng.uniform(0, 0.1), rng.uniform(-3, 3)
-        robots.step().check()
+        robot.see([seen(k + 1, *rng.uniform(-3, 3, 2), rng.uniform(-3, 3)) for k in range(rng.integers(0, 4))])
+        robot.fill(odom_x=rng.uniform(0, 0.1), compass=rng.uniform(-3, 3))
+        step(robot)
 
 
 @every_planner
 def test_the_same_inputs_give_the_same_outputs(name):
-    a, b = (random_scene(Robots(name), 5) for _ in range(2))
+    a, b = (random_scene(name, 5) for _ in range(2))
     for _ in range(5):
-        a.step()
-        b.step()
-    for x, y in zip((a.decisions, a.memories, a.shared), (b.decisions, b.memories, b.shared), strict=True):
+        step(a)
+        step(b)
+    for x, y in zip((a.decision, a.memory, a.shared), (b.decision, b.memory, b.shared), strict=True):
         assert x.tobytes() == y.tobytes()
 
 
 @every_planner
 def test_a_step_changes_its_own_rows_only(name):
-    robots = Robots(name, 3)
+    planner, swarm, memories, params = three_of(name)
     for k in range(3):
-        robots.ranges[k] = scan_at(circles_world([(0.7, 0.1 * k, 0.3)]), robots.rig)
-    arrays = [
-        robots.percepts,
-        robots.shared,
-        robots.memories,
-        robots.decisions,
-        robots.ranges,
-        *robots.scratch,
-    ]
+        swarm.scans[k] = scan_at(circles_world([(0.7, 0.1 * k, 0.3)]), swarm.rig)
+    arrays = [*arrays_of(swarm), memories]
     before = [a.copy() for a in arrays]
-    inputs = robots.ranges.tobytes()
-    robots.step(1, 2)
+    given = swarm.scans.tobytes(), swarm.percepts.tobytes()
+    decided = swarm.decisions[1].tobytes()
+    planner.step_all(1, 2, swarm, memories, params)
     for a, b in zip(arrays, before, strict=True):
-        if a is not robots.percepts:
-            assert a[0].tobytes() == b[0].tobytes()
-            assert a[2].tobytes() == b[2].tobytes()
-    assert robots.ranges.tobytes() == inputs
-    robots.percepts["now_s"] -= DT
-    assert robots.percepts.tobytes() == before[0].tobytes()
-    assert robots.decisions[1].tobytes() != before[3][1].tobytes()
+        assert a[0].tobytes() == b[0].tobytes()
+        assert a[2].tobytes() == b[2].tobytes()
+    assert (swarm.scans.tobytes(), swarm.percepts.tobytes()) == given
+    assert swarm.decisions[1].tobytes() != decided
 
 
 @every_planner
 def test_the_number_of_robots_in_a_call_does_not_matter(name):
-    together, apart = Robots(name, 3), Robots(name, 3)
-    for robots in (together, apart):
+    (planner, together, memories, params), (_, apart, other_memories, _) = three_of(name), three_of(name)
+    for swarm in (together, apart):
         for k in range(3):
-            robots.ranges[k] = scan_at(
-                circles_world([(1.0, 0.2 * k - 0.2, 0.3), (0.0, 1.0 + k, 0.5)]), robots.rig
-            )
-    together.step()
+            swarm.scans[k] = scan_at(circles_world([(1.0, 0.2 * k - 0.2, 0.3), (0.0, 1.0 + k, 0.5)]), swarm.rig)
+    planner.step_all(0, 3, together, memories, params)
     for k in (2, 0, 1):
-        apart.step(k, k + 1)
+        planner.step_all(k, k + 1, apart, other_memories, params)
     assert together.decisions.tobytes() == apart.decisions.tobytes()
 
 
@@ -163,14 +151,14 @@ def test_the_number_of_robots_in_a_call_does_not_matter(name):
 def test_the_mirrored_scene_gets_the_mirrored_command(name, seed):
     if model_of(name) is not None:
         pytest.skip("a network is not its own mirror image")
-    here, there = random_scene(Robots(name), seed), random_scene(Robots(name), seed, mirror=True)
+    here, there = random_scene(name, seed), random_scene(name, seed, mirror=True)
     for _ in range(4):
-        v, w = here.step().command()
-        if abs(here.decisions["p_left"][0] - 0.5) < 1e-3:
+        v, w = command(step(here))
+        if abs(here.said("p_left") - 0.5) < 1e-3:
             return
-        assert there.step().command() == pytest.approx((v, -w), abs=1e-5)
-        assert there.decisions["side"][0] == -here.decisions["side"][0]
-        assert there.decisions["state"][0] == here.decisions["state"][0]
+        assert command(step(there)) == pytest.approx((v, -w), abs=1e-5)
+        assert there.said("side") == -here.said("side")
+        assert there.said("state") == here.said("state")
 
 
 @every_planner
@@ -178,66 +166,61 @@ def test_the_mirrored_scene_gets_the_mirrored_command(name, seed):
 @given(seed=st.integers(0, 2**31), beams=st.integers(1, 359))
 def test_turning_the_robot_turns_its_heading(name, seed, beams):
     """The scene seen by a robot turned by whole beams: the direction wanted is the same in the world."""
-    here, there = random_scene(Robots(name), seed), random_scene(Robots(name), seed)
+    here, there = random_scene(name, seed), random_scene(name, seed)
     turn = beams * here.rig.sensor.increment
-    there.ranges[0] = np.roll(here.ranges[0], -beams)
-    there.percepts["goal_bearing"] = math.remainder(here.percepts["goal_bearing"][0] - turn, 2.0 * math.pi)
-    there.percepts["compass"] = turn
-    here.percepts["speed"] = there.percepts["speed"] = 0.0
-    here.step()
-    there.step()
-    difference = there.decisions["heading"][0] + turn - here.decisions["heading"][0]
+    there.scan[:] = np.roll(here.scan, -beams)
+    there.fill(goal_bearing=math.remainder(here.percept["goal_bearing"] - turn, 2.0 * math.pi), compass=turn)
+    here.fill(speed=0.0)
+    there.fill(speed=0.0)
+    step(here)
+    step(there)
+    difference = there.said("heading") + turn - here.said("heading")
     assert math.remainder(difference, 2.0 * math.pi) == pytest.approx(0.0, abs=1e-6)
-    assert there.decisions["side"][0] == here.decisions["side"][0]
+    assert there.said("side") == here.said("side")
 
 
 @every_planner
 def test_the_first_tick_with_an_empty_percept(name):
-    robots = Robots(name)
-    robots.percepts[:] = np.zeros((), PERCEPT)
-    robots.percepts["dt_s"] = DT
-    robots.step().check()
+    robot = one_robot(planner=usable(name))
+    robot.swarm.percepts[:] = np.zeros((), PERCEPT)
+    robot.fill(dt_s=DT)
+    step(robot)
 
 
 @every_planner
 @pytest.mark.parametrize("value", [math.nan, -1.0, -math.inf])
 def test_a_useless_scan_stops_the_robot(name, value):
-    robots = Robots(name)
-    robots.ranges[:] = value
+    robot = robot_of(name)
+    robot.scan[:] = value
     for _ in range(20):
-        robots.step().check()
-        assert robots.decisions["v"][0] < 1e-6
+        assert step(robot).said("v") < 1e-6
 
 
 @every_planner
 def test_with_nothing_in_range_it_drives_to_the_goal(name):
-    robots = Robots(name)
-    robots.step().check()
-    assert robots.command() == pytest.approx((0.5, 0.0))
-    robots.percepts["goal_bearing"] = 0.3
-    robots.step().check()
-    assert robots.command()[1] > 0.0
+    robot = robot_of(name)
+    assert command(step(robot)) == pytest.approx((0.5, 0.0))
+    robot.fill(goal_bearing=0.3)
+    assert step(robot).said("w") > 0.0
 
 
 @every_planner
 def test_at_the_goal_it_stands_still_for_good(name):
-    robots = Robots(name)
-    robots.percepts["goal_distance"] = 0.0
-    robots.step().check()
-    assert robots.command() == (0.0, 0.0)
-    assert robots.decisions["state"][0] == ARRIVED
-    robots.percepts["goal_distance"] = 0.2
-    robots.step()
-    assert robots.command() == (0.0, 0.0)
+    robot = robot_of(name)
+    robot.fill(goal_distance=0.0)
+    assert command(step(robot)) == (0.0, 0.0)
+    assert robot.said("state") == ARRIVED
+    robot.fill(goal_distance=0.2)
+    assert command(step(robot)) == (0.0, 0.0)
 
 
 @every_planner
 def test_an_obstacle_ahead_is_not_driven_at(name):
-    robots = Robots(name)
-    robots.ranges[0] = scan_at(circles_world([(0.6, 0.05, 0.3)]), robots.rig)
+    robot = robot_of(name)
+    robot.scan[:] = scan_at(circles_world([(0.6, 0.05, 0.3)]), robot.rig)
     for _ in range(5):
-        robots.step().check()
-        assert abs(robots.decisions["heading"][0]) > math.radians(30.0) or robots.decisions["v"][0] == 0.0
+        step(robot)
+        assert abs(robot.said("heading")) > math.radians(30.0) or robot.said("v") == 0.0
 
 
 @every_planner
@@ -254,3 +237,11 @@ def test_the_percept_has_no_global_pose():
         words = set(field.split("_"))
         if field not in relative:
             assert not words & {"x", "y", "pose", "position", "world", "map", "gps", "lat", "lon"}, field
+
+
+def test_the_percept_has_no_field_for_what_only_others_know():
+    """The side of the shortest way is told in the memory of planners that declare it, never in the percept."""
+    for field in PERCEPT.names:
+        assert not set(field.split("_")) & {"told", "side", "advice", "oracle", "seed", "truth", "true"}, field
+    told = {name for name in PLANNERS if load_planner(name).is_told}
+    assert told == {"dh-bug", "oracle"}

@@ -9,10 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from helpers import Rows, circle, circles_world, place_scenario, rig_of, run_scenario, scan_at, wall
-from swarmscope.onboard.perception.areas import normalise, passable_distance
-from swarmscope.onboard.planning import nav_scope, sfm_i, sfm_mas
-from swarmscope.onboard.reasons import ADVANCE, DECIDE, FOLLOW, YIELD
+from helpers import circle, circles_world, one_robot, place_scenario, rig_of, run_scenario, scan_at, seen, tick, wall
+from swarmscope.errors import ConfigError
+from swarmscope.onboard.deciding.choosing import own_probability
 from swarmscope.onboard.deciding.fields import (
     following_probability,
     fuse,
@@ -23,15 +22,19 @@ from swarmscope.onboard.deciding.fields import (
     propulsion,
     yields_to,
 )
-from swarmscope.onboard.deciding.choosing import own_probability
-from swarmscope.onboard.planning.sfm_mas import goes_first, obstacle_stops
+from swarmscope.onboard.deciding.waiting import PROPULSION, goes_first
+from swarmscope.onboard.perception.areas import normalise, passable_distance
+from swarmscope.onboard.planners import load_planner
+from swarmscope.onboard.planning.sfm_mas import obstacle_stops
+from swarmscope.onboard.reasons import ADVANCE, DECIDE, FOLLOW, YIELD
+from swarmscope.onboard.view import Table
 
 L_TH = 0.6
 HALF = math.radians(30.0)
 TREES = [circle(-1.0, 0.3, 0.35), circle(0.6, -0.8, 0.4), circle(1.2, 0.5, 0.3), circle(-0.4, -1.6, 0.3)]
 STARTS = [(-3.0, -1.5, 0.0), (-3.0, 0.0, 0.0), (-3.0, 1.5, 0.0)]
 GOALS = [(3.0, 1.0), (3.0, 0.0), (3.0, -1.0)]
-LETTER = {"look_ahead": 0.0, "sector": True}
+LETTER = {"look_ahead_m": 0.0, "sector": True}
 
 
 def test_the_constant_by_hand():
@@ -67,7 +70,7 @@ R4 = [[8, 1.78], [109, 1.17], [176, 1.85], [237, 1.27], [300, 1.69], [329, 1.62]
 def test_table_ii_as_this_planner_reads_it():
     """P_s of R3 by triangles, P_n of R4 with borders on the polygon, and the choice: alone left, together right."""
     rows = np.array(R3)
-    p_self = own_probability(np.radians(rows[:, 0]), rows[:, 1].copy(), len(rows), TABLE_HALF, 0.0, True)
+    p_self = own_probability(Table(np.radians(rows[:, 0]), rows[:, 1].copy()), len(rows), TABLE_HALF, 0.0, True)
     assert p_self == pytest.approx(0.5042, abs=5e-5)
     rows = np.array(R4)
     features = np.radians(rows[:, 0]), rows[:, 1].copy(), len(rows)
@@ -76,6 +79,15 @@ def test_table_ii_as_this_planner_reads_it():
     assert following_probability(x_1, x_2, normalise(2.696, 5.0), False) == pytest.approx(0.4137, abs=5e-4)
     p, f = np.array([0.395, 0.581, 0.403, 0.414]), np.array([0.236, 0.279, 0.266, 0.247])
     assert fuse(p_self, float(p @ f), float(f.sum())) == pytest.approx(0.478, abs=5e-4)
+
+
+def stops_for(ranges, bearing, rig):
+    """Whether the masked scan ``ranges`` stops a robot on its way to ``bearing``."""
+    robot = one_robot(rig)
+    robot.fill(goal_bearing=bearing)
+    see = robot.view
+    see.masked[:] = ranges
+    return obstacle_stops(see)
 
 
 @pytest.mark.parametrize(
@@ -95,8 +107,8 @@ def test_who_stops_by_the_letter(distance, degrees, stops):
     for sign in (1, -1):
         ranges = np.full(360, np.inf, np.float32)
         ranges[180 + sign * degrees if degrees < 180 else 0] = distance
-        assert obstacle_stops(ranges, 0.0, rig) is stops
-        assert obstacle_stops(np.roll(ranges, 90), 0.5 * math.pi, rig) is stops
+        assert stops_for(ranges, 0.0, rig) is stops
+        assert stops_for(np.roll(ranges, 90), 0.5 * math.pi, rig) is stops
 
 
 @pytest.mark.parametrize(
@@ -116,41 +128,34 @@ def test_with_look_ahead_it_stops_for_what_is_in_the_way_of_the_body(x, y, stops
     beam = round(math.degrees(bearing)) + 180
     ranges[beam % 360] = math.hypot(x, y)
     turn = math.radians(beam - 180) - bearing  # the return lies on a whole beam
-    assert obstacle_stops(ranges, turn, rig_of()) is stops
+    assert stops_for(ranges, turn, rig_of()) is stops
 
 
 def test_an_invalid_beam_ahead_stops():
     ranges = np.full(360, np.inf, np.float32)
     ranges[200] = np.nan
-    assert obstacle_stops(ranges, 0.0, rig_of())
-    assert not obstacle_stops(ranges, math.pi, rig_of())
+    assert stops_for(ranges, 0.0, rig_of())
+    assert not stops_for(ranges, math.pi, rig_of())
 
 
-def rows_before(*trees):
-    rows = Rows(rig_of())
-    rows.percepts["goal_distance"] = 5.0
-    rows.ranges[0] = scan_at(circles_world(trees), rows.rig)
-    return rows, sfm_mas.new_memory(1)
-
-
-def step(rows, memory, planner=sfm_mas):
-    arrays = (rows.ranges, rows.percepts, rows.shared, memory, rows.decisions, rows.scratch)
-    planner.step_all(0, 1, *arrays, rows.rig, planner.Params())
-    rows.percepts["now_s"] += 0.2
-    return rows.decisions[0]
+def robot_before(*trees, planner="sfm-mas", **params):
+    robot = one_robot(planner=planner, **params)
+    robot.fill(goal_distance=5.0)
+    robot.scan[:] = scan_at(circles_world(trees), robot.rig)
+    return robot
 
 
 def test_it_asks_only_when_it_has_to_decide_and_does_not_wait_for_ever():
-    rows, memory = rows_before((2.6, 0.05, 0.3))  # 2.3 m away: beyond what stops it
-    rows.see((1, 1.2, 0.8, 0.0))
-    decision = step(rows, memory)
+    robot = robot_before((2.6, 0.05, 0.3))  # 2.3 m away: beyond what stops it
+    robot.see([seen(1, 1.2, 0.8)])
+    decision = tick(robot)
     assert (decision["state"], decision["n_out"]) == (ADVANCE, 0)
-    rows.ranges[0] = scan_at(circles_world([(2.1, 0.05, 0.3)]), rows.rig)
-    decision = step(rows, memory)
+    robot.scan[:] = scan_at(circles_world([(2.1, 0.05, 0.3)]), robot.rig)
+    decision = tick(robot)
     assert (decision["state"], decision["n_out"], decision["v"]) == (DECIDE, 1, 0.0)
     states = []
     for _ in range(5):
-        decision = step(rows, memory)
+        decision = tick(robot)
         assert decision["n_out"] == 0
         states.append(int(decision["state"]))
     assert states[-1] in (FOLLOW, YIELD)
@@ -158,19 +163,17 @@ def test_it_asks_only_when_it_has_to_decide_and_does_not_wait_for_ever():
 
 
 def test_it_decides_at_once_when_nobody_is_in_the_pass_band():
-    rows, memory = rows_before((2.1, 0.05, 0.3))
-    rows.see((1, 3.2, 0.8, 0.0))
-    decision = step(rows, memory)
+    robot = robot_before((2.1, 0.05, 0.3))
+    robot.see([seen(1, 3.2, 0.8)])
+    decision = tick(robot)
     assert (decision["n_out"], decision["fused"], decision["side"]) == (0, 1, -1)
 
 
 def test_its_own_opinion_is_by_triangles():
     opinions = []
-    for planner in (sfm_mas, nav_scope):
-        rows, memory = rows_before((1.2, 0.05, 0.3), (0.5, 1.5, 0.4))
-        arrays = (rows.ranges, rows.percepts, rows.shared, memory, rows.decisions, rows.scratch)
-        planner.step_all(0, 1, *arrays, rows.rig, planner.Params(prior=0.0))
-        opinions.append(float(rows.decisions["p_self"][0]))
+    for planner in ("sfm-mas", "nav-scope"):
+        robot = robot_before((1.2, 0.05, 0.3), (0.5, 1.5, 0.4), planner=planner, prior=0.0)
+        opinions.append(float(tick(robot)["p_self"]))
     assert abs(opinions[0] - opinions[1]) > 1e-3
 
 
@@ -181,27 +184,28 @@ cosine = st.floats(-1.0, 1.0)
 @given(cosine, cosine)
 def test_of_two_that_would_wait_exactly_one_goes(ours, its):
     if yields_to(0.5, NEAR, ours) and yields_to(0.5, NEAR, its):
-        assert goes_first(0.5, NEAR, ours, its, True) != goes_first(0.5, NEAR, its, ours, False)
+        assert goes_first(NEAR, ours, its, True) != goes_first(NEAR, its, ours, False)
 
 
 def test_who_is_ahead_goes_first():
-    assert goes_first(0.5, NEAR, 1.0, -1.0, False)  # it drives away from us
-    assert goes_first(0.5, NEAR, 1.0, 0.0, False)  # it crosses before us
-    assert goes_first(0.5, NEAR, 1.0, 0.7, False)  # we see it straight ahead, it sees us to its side
-    assert not goes_first(0.5, NEAR, 0.7, 1.0, True)
-    assert goes_first(0.5, NEAR, 1.0, 1.0, True)  # head on: the smaller address
-    assert not goes_first(0.5, NEAR, 1.0, 1.0, False)
+    assert PROPULSION == 0.5
+    assert goes_first(NEAR, 1.0, -1.0, False)  # it drives away from us
+    assert goes_first(NEAR, 1.0, 0.0, False)  # it crosses before us
+    assert goes_first(NEAR, 1.0, 0.7, False)  # we see it straight ahead, it sees us to its side
+    assert not goes_first(NEAR, 0.7, 1.0, True)
+    assert goes_first(NEAR, 1.0, 1.0, True)  # head on: the smaller address
+    assert not goes_first(NEAR, 1.0, 1.0, False)
 
 
 def meeting(yaw, peer, ticks):
-    """Robot 0 (address 5) sees robot ``peer`` 0.6 m ahead, moving along ``yaw``; return its states."""
-    rows, memory = rows_before()
-    rows.percepts["id"] = 5
+    """A robot (address 5) sees robot ``peer`` 0.6 m ahead, moving along ``yaw``; return its states."""
+    robot = robot_before()
+    robot.fill(id=5)
     states = []
     for k in range(ticks):
         back = 0.1 * (k % 2)  # it moves, but stays where it is
-        rows.see((peer, 0.6 - back * math.cos(yaw), -back * math.sin(yaw), yaw))
-        states.append(int(step(rows, memory)["state"]))
+        robot.see([seen(peer, 0.6 - back * math.cos(yaw), -back * math.sin(yaw), yaw)])
+        states.append(int(tick(robot)["state"]))
     return states
 
 
@@ -232,9 +236,16 @@ def test_sfm_i_runs_like_sfm_mas_without_weight_bit_for_bit():
         assert one.tobytes() == other.tobytes()
     assert alone.robots["bytes"].sum() == 0
     assert trace_of("sfm-mas").robots["bytes"].sum() > 0
-    ours, full = sfm_i.Params._field_defaults, sfm_mas.Params._field_defaults
-    assert set(full) - set(ours) == {"w_i", "patience_s"}
+    ours, full = load_planner("sfm-i").defaults, load_planner("sfm-mas").defaults
+    assert set(full) - set(ours) == {"w_i", "patience_s", "answers"}
+    assert set(ours) <= set(full)
     assert all(full[name] == value for name, value in ours.items())
+
+
+@pytest.mark.parametrize("key", ["w_i", "patience_s", "answers"])
+def test_what_makes_sfm_i_what_it_is_cannot_be_set(key):
+    with pytest.raises(ConfigError, match=f"planner 'sfm-i': {key}: is fixed at 0"):
+        load_planner("sfm-i").params({key: 1})
 
 
 @pytest.mark.parametrize("name", ["sfm-mas", "sfm-i"])

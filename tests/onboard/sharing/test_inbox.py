@@ -11,8 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from helpers import Rows, rig_of
+from helpers import one_robot, rig_of
 from swarmscope.onboard.percept import MAX_INBOX, MAX_OUTBOX, PEERS
+from swarmscope.onboard.sharing.feature_message import FeatureMessage
 from swarmscope.onboard.sharing.inbox import (
     answer_all,
     ask,
@@ -27,10 +28,10 @@ from swarmscope.onboard.sharing.message import (
     MAX_FEATURES,
     MAX_PACKET_BYTES,
     OK,
-    FeatureMessage,
     decode,
     encode_request,
 )
+from swarmscope.onboard.view import new_swarm, python_view
 
 RANGE_MAX = 5.0
 ANGLES, DISTANCES = (0.5, 2.0, 4.0), (1.0, 2.0, 3.0)
@@ -46,23 +47,15 @@ def features(sender, seq, reply_to):
 
 
 def rows_of(now=10.0, **options):
-    rows = Rows(rig_of(**options))
-    rows.percepts["now_s"] = now
-    rows.percepts["id"] = 1
+    rows = one_robot(rig_of(**options), address=1)
+    rows.fill(now_s=now)
     return rows
 
 
 def read(rows, *packets):
-    rows.receive(*packets)
-    read_inbox(
-        rows.percept,
-        rows.memory,
-        rows.rig,
-        rows.scratch.header[0],
-        rows.scratch.angles[0, 1],
-        rows.scratch.distances[0, 1],
-    )
-    return rows.shared[0]
+    rows.receive(list(packets))
+    read_inbox(rows.view)
+    return rows.shared
 
 
 def dropped(row):
@@ -70,15 +63,14 @@ def dropped(row):
 
 
 def asked(rows, *peers):
-    start_round(rows.percept, rows.memory)
+    start_round(rows.view)
     for peer in peers:
-        ask(rows.percept, rows.memory, rows.decision, peer)
-    return int(rows.shared["asked_seq"][0])
+        ask(rows.view, peer)
+    return int(rows.shared["asked_seq"])
 
 
-def sent(rows):
-    """The outbox as [(to, bytes)]."""
-    row = rows.decisions[0]
+def sent(row):
+    """The outbox of a decision as [(to, bytes)]."""
     return [
         (int(row["out_to"][k]), row["out"][k, : row["out_length"][k]].tobytes()) for k in range(row["n_out"])
     ]
@@ -114,9 +106,10 @@ def test_requests_wait_to_be_answered_for_this_tick_only():
 def test_answers_carry_the_askers_sequence_number(exact):
     rows = rows_of(exact_features=exact)
     read(rows, request(5, 31), request(6, 777))
-    angles, distances = np.array(ANGLES), np.array(DISTANCES)
-    answer_all(rows.percept, rows.memory, rows.decision, rows.rig, angles, distances, 3)
-    out = sent(rows)
+    own = rows.view.own
+    own.angles[:3], own.distances[:3] = ANGLES, DISTANCES
+    answer_all(rows.view, 3)
+    out = sent(rows.decision)
     assert [to for to, _ in out] == [5, 6]
     kind = KIND_EXACT_FEATURES if exact else KIND_FEATURES
     headers = [header_of(packet) for _, packet in out]
@@ -129,7 +122,7 @@ def test_answers_carry_the_askers_sequence_number(exact):
 def test_requests_carry_our_address_and_the_rounds_number():
     rows = rows_of()
     seq = asked(rows, 4, 8)
-    assert [(to, header_of(p)[:3]) for to, p in sent(rows)] == [
+    assert [(to, header_of(p)[:3]) for to, p in sent(rows.decision)] == [
         (4, [KIND_REQUEST, 1, seq]),
         (8, [KIND_REQUEST, 1, seq]),
     ]
@@ -193,35 +186,35 @@ def test_an_answer_to_an_earlier_round_is_dropped():
 
 
 def test_an_answer_that_comes_too_late_is_dropped():
-    rows = rows_of(max_feature_age=1.5)
+    rows = rows_of(max_age_s=1.5)
     seq = asked(rows, 5)
-    rows.percepts["now_s"] += 1.6
+    rows.percept["now_s"] += 1.6
     row = read(rows, features(5, 40, seq))
     assert dropped(row) == (0, 1)
     assert (row["heard_id"] == -1).all()
 
 
 def test_features_are_forgotten_when_they_are_old():
-    rows = rows_of(max_feature_age=1.5)
+    rows = rows_of(max_age_s=1.5)
     row = read(rows, features(5, 40, asked(rows, 5)))
-    rows.percepts["now_s"] += 1.4
+    rows.percept["now_s"] += 1.4
     assert 5 in read(rows)["heard_id"]
-    rows.percepts["now_s"] += 0.2
+    rows.percept["now_s"] += 0.2
     assert 5 not in read(rows)["heard_id"]
     assert dropped(row) == (0, 0)
 
 
 def test_waiting_ends_with_the_last_answer_or_with_the_patience():
     rows = rows_of()
-    assert not waiting_for_answers(rows.percept, rows.memory, 0.6)
+    assert not waiting_for_answers(rows.percept, rows.shared, 0.6)
     seq = asked(rows, 5, 6)
     read(rows, features(5, 40, seq))
-    assert waiting_for_answers(rows.percept, rows.memory, 0.6)
+    assert waiting_for_answers(rows.percept, rows.shared, 0.6)
     read(rows, features(6, 2, seq))
-    assert not waiting_for_answers(rows.percept, rows.memory, 0.6)
+    assert not waiting_for_answers(rows.percept, rows.shared, 0.6)
     asked(rows, 5)
-    rows.percepts["now_s"] += 0.7
-    assert not waiting_for_answers(rows.percept, rows.memory, 0.6)
+    rows.percept["now_s"] += 0.7
+    assert not waiting_for_answers(rows.percept, rows.shared, 0.6)
 
 
 def test_more_senders_than_slots_keep_being_heard():
@@ -235,14 +228,11 @@ def test_more_senders_than_slots_keep_being_heard():
 def test_a_full_outbox_takes_no_more():
     rows = rows_of()
     asked(rows, *range(100, 100 + MAX_OUTBOX + 5))
-    row = rows.decisions[0]
-    assert row["n_out"] == MAX_OUTBOX
-    assert rows.shared["asked_n"][0] == MAX_OUTBOX
+    assert rows.decision["n_out"] == MAX_OUTBOX
+    assert rows.shared["asked_n"] == MAX_OUTBOX
     read(rows, *(request(200 + k, 1) for k in range(MAX_INBOX)))
-    answer_all(
-        rows.percept, rows.memory, rows.decision, rows.rig, np.zeros(MAX_FEATURES), np.zeros(MAX_FEATURES), 16
-    )
-    assert rows.decisions[0]["n_out"] == MAX_OUTBOX
+    answer_all(rows.view, 16)
+    assert rows.decision["n_out"] == MAX_OUTBOX
 
 
 packets = st.one_of(
@@ -255,25 +245,30 @@ packets = st.one_of(
 @settings(max_examples=60)
 @given(st.lists(st.lists(packets, max_size=MAX_INBOX), max_size=12))
 def test_any_packets_in_any_order_leave_the_tables_whole(ticks):
-    rows = Rows(rig_of(), robots=3)
-    before = rows.shared.copy()
+    swarm = new_swarm(3, rig_of())
+    see, given = python_view(swarm, 0), one_robot(swarm.rig)
+    before = swarm.shared.copy()
     seen = 0
     for k, inbox in enumerate(ticks):
-        rows.percepts["now_s"] = 0.2 * k
-        rows.decisions["n_out"] = 0
-        asked(rows, 5)
-        row = read(rows, *inbox)
+        given.fill(now_s=0.2 * k)
+        given.receive(inbox)
+        swarm.percepts[0] = given.percept
+        swarm.decisions["n_out"] = 0
+        start_round(see)
+        ask(see, 5)
+        read_inbox(see)
+        row = see.shared
         seen += len(inbox)
         assert 0 <= row["ask_n"] <= PEERS
         assert ((row["heard_n"] >= 0) & (row["heard_n"] <= MAX_FEATURES)).all()
         assert np.isfinite(row["heard_angle"]).all()
         assert ((row["heard_distance"] >= 0.0) & (row["heard_distance"] <= RANGE_MAX)).all()
         assert sum(dropped(row)) <= seen
-        answer_all(rows.percept, rows.memory, rows.decision, rows.rig, np.zeros(16), np.zeros(16), 16)
-        assert 0 <= rows.decisions[0]["n_out"] <= MAX_OUTBOX
-        for _, packet in sent(rows):
+        answer_all(see, 16)
+        assert 0 <= see.out["n_out"] <= MAX_OUTBOX
+        for _, packet in sent(see.out):
             header_of(packet)
-    assert rows.shared[1:].tobytes() == before[1:].tobytes()
+    assert swarm.shared[1:].tobytes() == before[1:].tobytes()
 
 
 def test_no_index_leaves_its_table():

@@ -16,12 +16,13 @@ from hypothesis import strategies as st
 
 from swarmscope.errors import SwarmscopeError
 from swarmscope.onboard.sharing import message
+from swarmscope.onboard.sharing.codes import CRC_INIT, crc16
+from swarmscope.onboard.sharing.feature_message import FeatureMessage, PacketError
 from swarmscope.onboard.sharing.message import (
     BAD_CHECKSUM,
     BAD_KIND,
     BAD_LENGTH,
     BAD_VERSION,
-    CRC_INIT,
     DIRECTED_REQUEST_BYTES,
     HEADER_FIELDS,
     KIND_DIRECTED_REQUEST,
@@ -37,9 +38,7 @@ from swarmscope.onboard.sharing.message import (
     REQUEST_BYTES,
     STATUS_NAMES,
     TOO_SHORT,
-    FeatureMessage,
-    PacketError,
-    crc16,
+    Head,
     decode,
     direction_of,
     encode_directed_request,
@@ -70,14 +69,14 @@ def features(angles, distances, n=None, range_max=RANGE, encode=encode_features)
     out = np.zeros(MAX_FEATURES_BYTES, np.uint8)
     angles, distances = np.array(angles, np.float64), np.array(distances, np.float64)
     n = angles.size if n is None else n
-    length = encode(0x0102, 0x0304, 0x0506, angles, distances, n, range_max, out)
+    length = encode(Head(0x0102, 0x0304, 0x0506), angles, distances, n, range_max, out)
     return out[:length].copy()
 
 
 def exact(angles, distances, n=None):
     out = np.zeros(MAX_PACKET_BYTES, np.uint8)
     angles, distances = np.array(angles, np.float64), np.array(distances, np.float64)
-    length = encode_exact_features(1, 2, 3, angles, distances, angles.size if n is None else n, out)
+    length = encode_exact_features(Head(1, 2, 3), angles, distances, angles.size if n is None else n, out)
     return out[:length].copy()
 
 
@@ -94,7 +93,7 @@ def directed(direction, sender=5, seq=6):
 def latent(codes=None, scale=200, sender=5, seq=6, reply_to=7):
     out = np.zeros(MAX_PACKET_BYTES, np.uint8)
     codes = np.arange(LATENT_FEATURES, dtype=np.uint8) if codes is None else codes
-    return out[: encode_latent(sender, seq, reply_to, codes, scale, out)].copy()
+    return out[: encode_latent(Head(sender, seq, reply_to), codes, scale, out)].copy()
 
 
 def status_of(data, length=None):
@@ -302,7 +301,7 @@ def test_features_that_were_not_sent_sorted_are_read_sorted():
 
 def test_inputs_are_left_alone():
     angles, distances = np.array([3.0, 1.0]), np.array([9.0, -9.0])
-    encode_features(1, 2, 3, angles, distances, 2, RANGE, np.zeros(50, np.uint8))
+    encode_features(Head(1, 2, 3), angles, distances, 2, RANGE, np.zeros(50, np.uint8))
     assert angles.tolist() == [3.0, 1.0]
     assert distances.tolist() == [9.0, -9.0]
 
@@ -326,12 +325,12 @@ def test_wrong_counts_are_cut_to_what_is_there(encoded, n):
 
 def test_no_room_gives_no_packet():
     two = np.ones(2)
-    assert encode_features(1, 2, 3, two, two, 2, RANGE, np.zeros(13, np.uint8)) == 0
-    assert encode_exact_features(1, 2, 3, two, two, 2, np.zeros(25, np.uint8)) == 0
+    assert encode_features(Head(1, 2, 3), two, two, 2, RANGE, np.zeros(13, np.uint8)) == 0
+    assert encode_exact_features(Head(1, 2, 3), two, two, 2, np.zeros(25, np.uint8)) == 0
     assert encode_request(1, 2, np.zeros(6, np.uint8)) == 0
     assert encode_directed_request(1, 2, 0.0, np.zeros(7, np.uint8)) == 0
-    assert encode_latent(1, 2, 3, np.zeros(128, np.uint8), 4, np.zeros(137, np.uint8)) == 0
-    assert encode_latent(1, 2, 3, np.zeros(127, np.uint8), 4, np.zeros(138, np.uint8)) == 0
+    assert encode_latent(Head(1, 2, 3), np.zeros(128, np.uint8), 4, np.zeros(137, np.uint8)) == 0
+    assert encode_latent(Head(1, 2, 3), np.zeros(127, np.uint8), 4, np.zeros(138, np.uint8)) == 0
 
 
 def test_reading_into_short_arrays_stays_inside():
@@ -587,8 +586,8 @@ for _ in range(100):
     if n > 3:
         angles[0], angles[1], distances[2], distances[3] = np.nan, np.inf, np.nan, np.inf
     for length in (
-        m.encode_features(70000, 65535, n, angles, distances, n, 5.0, out),
-        m.encode_exact_features(n, n, n, angles, distances, n, out),
+        m.encode_features(m.Head(70000, 65535, n), angles, distances, n, 5.0, out),
+        m.encode_exact_features(m.Head(n, n, n), angles, distances, n, out),
         m.encode_request(n, 65535, out),
     ):
         print(out.tobytes().hex(), m.decode(out, length, header), header.tolist())

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from helpers import DT, Rows, circles_world, make_sensor, rig_of, scan_at
+from helpers import DT, circles_world, make_sensor, one_robot, rig_of, scan_at, seen
 from swarmscope.onboard.percept import PEERS
 from swarmscope.onboard.sharing.tracks import mask_moving_neighbours, update_odometry, update_tracks
 from swarmscope.sim.lidar import make_beams
@@ -18,10 +18,10 @@ STILL_S = 0.6
 
 
 class Watcher:
-    """Robot 0 of the rows with a pose in the world; it watches neighbours (id -> x, y, yaw)."""
+    """A robot with a pose in the world; it watches neighbours (id -> x, y, yaw)."""
 
     def __init__(self, rig=None, pose=(0.0, 0.0, 0.0)):
-        self.rows = Rows(rig or rig_of())
+        self.rows = one_robot(rig)
         self.pose = self.last = pose
         self.tick = 0
 
@@ -30,22 +30,21 @@ class Watcher:
         self.last, self.pose = self.pose, (x, y, yaw)
         c, s = math.cos(self.last[2]), math.sin(self.last[2])
         dx, dy = x - self.last[0], y - self.last[1]
-        rows.percepts["odom_x"], rows.percepts["odom_y"] = c * dx + s * dy, c * dy - s * dx
-        rows.percepts["compass"], rows.percepts["now_s"] = yaw, self.tick * DT
+        rows.fill(odom_x=c * dx + s * dy, odom_y=c * dy - s * dx, compass=yaw, now_s=self.tick * DT)
         c, s = math.cos(yaw), math.sin(yaw)
         rows.see(
-            *(
-                (name, c * (nx - x) + s * (ny - y), c * (ny - y) - s * (nx - x), nyaw - yaw)
+            [
+                seen(name, c * (nx - x) + s * (ny - y), c * (ny - y) - s * (nx - x), nyaw - yaw)
                 for name, (nx, ny, nyaw) in neighbours.items()
-            )
+            ]
         )
-        dx, dy = update_odometry(rows.percept, rows.memory)
-        update_tracks(rows.percept, rows.memory, rows.rig, dx, dy)
+        dx, dy = update_odometry(rows.percept, rows.shared)
+        update_tracks(rows.percept, rows.shared, rows.rig, dx, dy)
         self.tick += 1
 
     def track(self, name):
         """Position and velocity in the world, when it moved last; None without a track."""
-        row = self.rows.shared[0]
+        row = self.rows.shared
         at = np.flatnonzero(row["track_id"] == name)
         if not at.size:
             return None
@@ -54,10 +53,10 @@ class Watcher:
         return place, np.array([row["track_vx"][t], row["track_vy"][t]]), row["track_moved_s"][t]
 
     def mask(self, ranges):
-        out = np.full_like(ranges, -1.0)
-        rows = self.rows
-        mask_moving_neighbours(ranges, rows.percept, rows.memory, rows.rig, STILL_S, out)
-        return out
+        see = self.rows.view
+        see.scan[:], see.masked[:] = ranges, -1.0
+        mask_moving_neighbours(see, STILL_S)
+        return see.masked.copy()
 
 
 @settings(max_examples=30)
@@ -86,15 +85,15 @@ def test_noise_is_averaged():
     errors, raw = [], []
     for k in range(300):
         true = np.array([2.0, 0.3 * math.sin(0.05 * k)])
-        seen = true * (1.0 + 0.02 * rng.normal())
-        watcher.watch({7: (*seen, 0.0)})
+        measured = true * (1.0 + 0.02 * rng.normal())
+        watcher.watch({7: (*measured, 0.0)})
         errors.append(np.hypot(*(watcher.track(7)[0] - true)))
-        raw.append(np.hypot(*(seen - true)))
+        raw.append(np.hypot(*(measured - true)))
     assert np.mean(errors[20:]) < np.mean(raw[20:])
 
 
 def test_a_vanished_neighbour_is_kept_for_the_persistence_and_then_dropped():
-    watcher = Watcher(rig_of(persistence=2.0))
+    watcher = Watcher(rig_of(persistence_s=2.0))
     for k in range(10):
         watcher.watch({7: (2.0 + 0.3 * k * DT, 0.0, 0.0)})
     last = watcher.track(7)[0]

@@ -15,7 +15,7 @@ import numpy as np
 from swarmscope._jit import jit
 from swarmscope.disk import geodesic
 from swarmscope.disk.contact import nearest_on_the_way
-from swarmscope.disk.geodesic import Ways, _along_slot, _clear_run, _next_node, _turn, look_up
+from swarmscope.disk.geodesic import Ways, _along_slot, _by_last_tangent, _clear_run, _next_node, _turn, look_up
 from swarmscope.disk.rules import ROUNDING, Floats
 
 VERTICES = 4000
@@ -182,12 +182,7 @@ def trace(ways: Ways, field: int, x: float, y: float, spacing: float, out: Float
                     slot, angle, node = ways.node_to[node], ways.node_to_angle[node], -1
                     continue
             clear = _clear_run(ways, slot, angle) + 1e-9
-            local = slot - first_slot + ways.field_slot[field]
-            last, turn_last = math.inf, 0.0
-            if ways.last_angle[local] == ways.last_angle[local]:
-                turn_last = _turn(slot, angle, ways.last_angle[local])
-                if turn_last <= clear:
-                    last = turn_last * rho + ways.last_length[local]
+            last, turn_last = _by_last_tangent(ways, field, slot, angle, clear)
             begin, end = ways.slot_start[slot], ways.slot_start[slot + 1]
             follow, turn_node, following = math.inf, 0.0, -1
             if end > begin:

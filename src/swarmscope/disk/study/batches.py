@@ -13,9 +13,10 @@ from typing import Any, NamedTuple
 
 from swarmscope.disk import controllers
 from swarmscope.disk.runs import Controller, Film, Outcome, Problem, no_outcome, play
-from swarmscope.disk.user import UserController, compiled, function_of
+from swarmscope.disk.user import UserController, function_of
 from swarmscope.errors import ConfigError, SwarmscopeError
 from swarmscope.experiments.engines.local import start_worker
+from swarmscope.user_files import compiled
 
 Report = Callable[[int, float, float], None]
 """Called with the number of runs done, and for a user's controller the seconds of a call and those left (else 0)."""

@@ -166,10 +166,11 @@ def first_safe(safe: np.ndarray, start: float, side: int, sensor: Sensor) -> tup
     beams = sensor.beams
     circle = beams if sensor.wraps else int(TWO_PI / sensor.increment)
     n = int(math.floor((start - sensor.angle_min) / sensor.increment + 0.5)) % circle
+    step = int(side)  # without the compiler an int8 would overflow
     for _ in range(circle):
         if n < beams and safe[n] == 1:
             return wrap_angle(sensor.angle_min + n * sensor.increment), True
-        n += side
+        n += step
         if n == circle:
             n = 0
         elif n < 0:

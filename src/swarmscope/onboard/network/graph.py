@@ -84,7 +84,7 @@ def quantise(features: np.ndarray, out: np.ndarray) -> int:
 @jit
 def scale_of(code: int) -> float:
     """Return the value that one step of a quantised feature stands for."""
-    return float(2.0 ** ((code - SCALE_ZERO) / STEPS_PER_OCTAVE))
+    return float(2.0 ** ((int(code) - SCALE_ZERO) / STEPS_PER_OCTAVE))  # a byte would wrap without the compiler
 
 
 @jit
