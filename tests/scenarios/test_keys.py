@@ -62,7 +62,7 @@ def test_units_and_bounds_are_read_off():
     assert keys["record_scans"].takes == "auto, yes, no" and keys["radio.bitrate_bps"].unit == "bit/s"
     assert keys["place.starts"].default == MUST and keys["place.world.obstacles"].default == []
     assert {key.unit for key in planner_keys("nav-scope")} >= {"m", "s", "rad"}
-    assert [key.takes for key in task_keys("T1")][-1] == "trees, rocks"
+    assert [key.takes for key in task_keys("T1")][-1] == "one of trees, rocks"
 
 
 @pytest.mark.parametrize(("keys_of", "name"), MEMBERS, ids=lambda item: item if isinstance(item, str) else "")

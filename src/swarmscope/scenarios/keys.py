@@ -7,6 +7,7 @@ import inspect
 import re
 import sys
 from collections.abc import Iterator, Mapping
+from dataclasses import is_dataclass
 from typing import Any, NamedTuple, get_args
 
 from swarmscope.bounds import Field, about
@@ -53,23 +54,18 @@ def meanings() -> dict[str, str]:
 def task_keys(name: str) -> list[Key]:
     """Return the options of a task."""
     task = load_task(name)
-    kind = getattr(task, "OPTIONS", None)
-    docs = {} if kind is None else docs_of(kind)
-    return [_key_of(f"task.options.{field.name}", field, docs) for field in option_fields(task).values()]
+    docs: dict[str, str] = {}
+    for kind in vars(task).values():
+        if isinstance(kind, type) and is_dataclass(kind):
+            docs |= docs_of(kind)
+    return [_member_key("task.options", field, docs) for field in option_fields(task).values()]
 
 
 def planner_keys(name: str) -> list[Key]:
     """Return the parameters of a planner."""
     planner = load_planner(name)
     docs = docs_of(planner.params_type)
-    return [_key_of(f"planner.params.{field.name}", field, docs) for field in planner.fields.values()]
-
-
-def _key_of(name: str, field: Field, docs: Mapping[str, str]) -> Key:
-    unit = field.bounds.unit
-    takes = about(field).removesuffix(f" {unit}")
-    key = _key(name, takes, field.default, docs.get(field.name, ""))
-    return key._replace(unit=key.unit or UNITS.get(unit, unit))
+    return [_member_key("planner.params", field, docs) for field in planner.fields.values()]
 
 
 def docs_of(kind: type) -> dict[str, str]:
@@ -131,6 +127,14 @@ def _takes(field: Mapping[str, Any]) -> str:
         return f"names and values ({_takes(field['additionalProperties'])})"
     bounds = [f"{sign} {_short(field[limit])}" for limit, sign in LIMITS.items() if limit in field]
     return " ".join([KINDS[field["type"]], ", ".join(bounds)]).strip()
+
+
+def _member_key(group: str, field: Field, docs: Mapping[str, str]) -> Key:
+    """Return what can be set of a task or a planner."""
+    unit = field.bounds.unit
+    takes = about(field._replace(bounds=field.bounds._replace(unit="")))
+    key = _key(f"{group}.{field.name}", takes, field.default, docs.get(field.name, ""))
+    return key._replace(unit=UNITS.get(unit, unit) or key.unit)
 
 
 def _key(name: str, takes: str, default: Any, text: str) -> Key:

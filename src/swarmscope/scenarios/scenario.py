@@ -1,7 +1,7 @@
 """The schema of a scenario: one file that describes one run completely, validated.
 
-A default that the kernels have, too, is taken from there: ``Body``, ``Noise``, ``Radio``, ``Guarding``,
-``Safety``, ``Sharing``, ``Setting``.
+A default that the kernels have, too, is taken from there: ``Body``, ``Guarding``, ``Safety``, ``Sharing``, ``Noise``,
+``Radio``, ``Setting``.
 The text after a field is its meaning, with the unit in brackets; docs/scenario.md and ``swarmscope config`` print it.
 """
 
