@@ -19,11 +19,11 @@ from pathlib import Path
 
 import numpy as np
 from llvmlite import binding
-from swarmscope.onboard.planners import planner_names
 
 from swarmscope.judging.metrics import average_path_length_m, path_lengths
 from swarmscope.judging.provenance import installed_version
 from swarmscope.judging.run import References, play
+from swarmscope.onboard.planners import planner_names
 from swarmscope.scenarios.read import parse_scenario
 from swarmscope.tasks._contract import task_names
 

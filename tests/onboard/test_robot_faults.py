@@ -258,15 +258,15 @@ def test_packets_of_braking_ticks_are_not_lost():
 def test_a_planner_that_fails_brakes():
     driver = Driver()
     driver.ticks(2)
-    planner = driver.robot.rows._planner
+    planner = driver.robot.rows.planner
 
     class Broken:
         def step_all(self, *arguments):
             raise ZeroDivisionError
 
-    driver.robot.rows._planner = Broken()
+    driver.robot.rows.planner = Broken()
     assert brakes(driver.tick())
-    driver.robot.rows._planner = planner
+    driver.robot.rows.planner = planner
     assert driver.tick().v == 0.5
     assert driver.robot.faults == {"error": 1}
 
@@ -275,10 +275,10 @@ def test_a_planner_that_asks_for_the_impossible_brakes():
     driver = Driver()
 
     class Wild:
-        def step_all(self, first, last, ranges, percepts, shared, memories, decisions, *rest):
-            decisions["v"], decisions["w"] = NAN, 1e9
+        def step_all(self, first, last, swarm, memories, params):
+            swarm.decisions["v"], swarm.decisions["w"] = NAN, 1e9
 
-    driver.robot.rows._planner = Wild()
+    driver.robot.rows.planner = Wild()
     assert brakes(driver.tick())
     assert driver.robot.faults == {"planner": 1}
 

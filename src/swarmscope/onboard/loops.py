@@ -38,7 +38,7 @@ def compiled_step(decide: Callable[..., None], module: ModuleType) -> Step:
     code = _each.__code__.replace(co_name=name, co_filename=place.co_filename, co_firstlineno=place.co_firstlineno)
     loop = FunctionType(code, names, name)
     loop.__qualname__, loop.__module__ = name, module.__name__
-    step: Step = jit_for(loop, Path(str(module.__file__)))
+    step: Step = jit_for(loop, also=Path(__file__))
     return step
 
 
