@@ -19,8 +19,9 @@ from helpers import circle, circles_world, one_robot, place_scenario, scan_at, t
 from swarmscope.onboard.loops import is_compiled
 from swarmscope.onboard.planners import planners_in
 from swarmscope.onboard.planning import nav_scope
+from swarmscope.scenarios.places import make_setup
 from swarmscope.scenarios.read import parse_scenario
-from swarmscope.scenarios.to_kernels import make_setting, make_setup
+from swarmscope.scenarios.to_kernels import make_setting
 from swarmscope.sim.loop import run
 
 BOLD = '''
