@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 from rich.table import Table
 
 from swarmscope.bounds import Value, about
@@ -11,10 +13,13 @@ from swarmscope.scenarios.keys import docs_of
 from swarmscope.tasks import load_task, task_names
 from swarmscope.tasks._contract import all_options
 
+WIDE = 150
+"""Columns of a table that goes into a file or another program."""
+
 
 def list_planners() -> None:
     """Print every planner with what it is given and its parameters."""
-    console = PlainConsole()
+    console = PlainConsole(width=None if sys.stdout.isatty() else WIDE)
     for name in planner_names():
         planner = load_planner(name)
         console.print(f"[bold]{name}[/bold]  {planner.summary.removeprefix(f'{name}: ')}")
