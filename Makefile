@@ -17,7 +17,7 @@ export SWARMSCOPE_CACHE = $(CURDIR)/.numba_cache
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help run test check fuzz bench setup setup-dev clean
+.PHONY: help run test check fuzz golden bench setup setup-dev clean
 
 help: ## print this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -36,6 +36,9 @@ check: setup-dev ## linter, strict types, import contract
 
 fuzz: setup-dev ## run the property tests with new examples for MINUTES=10, until one fails
 	$(BIN)/python tests/fuzz.py --minutes $(MINUTES)
+
+golden: setup-dev ## write the golden file of all planners' runs anew
+	$(BIN)/python tests/golden_runs.py --renew
 
 bench: setup-dev ## measure speed against floors and peers
 	$(BIN)/python benchmarks/run_all.py

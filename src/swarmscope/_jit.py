@@ -118,30 +118,30 @@ short kernels, and a kernel that allocates does not compile."""
 warnings.filterwarnings("ignore", "Record.*has been considered a subtype", numba.NumbaExperimentalFeatureWarning)
 
 
-def jit_for(function: F, file: Path | None = None, options: dict[str, Any] = LEAN) -> F:
+def jit_for(function: F, also: Path | None = None, options: dict[str, Any] = LEAN) -> F:
     """Compile ``function``; its cached code is valid as long as nothing changes in what its file imports.
 
-    With ``file``, what that one imports counts, too: a loop that is made from one file's code with functions of
-    another one depends on both.
+    What ``also`` imports counts, too: a loop that is made from one file's code with functions of another one depends on
+    both.
     """
     njit: Any = numba.njit
-    with _cached_in(_cache_of(function, file)):
+    with _cached_in(_cache_of(function, also)):
         return cast("F", njit(**options)(function))
 
 
-def _cache_of(function: Callable[..., Any], file: Path | None) -> Path | None:
+def _cache_of(function: Callable[..., Any], also: Path | None) -> Path | None:
     config: Any = numba.config
     if config.DISABLE_JIT:
         return None
     own = Path(os.path.realpath(function.__code__.co_filename))
-    place = own if file is None else Path(os.path.realpath(file))
+    more = () if also is None else (Path(os.path.realpath(also)),)
     package = function.__module__.partition(".")[0]
     folder = Path(sys.modules[package].__path__[0]) if package.startswith(OF_A_USER) else None
     try:
-        states = [closure_state(one, folder) for one in dict.fromkeys((place, own))]
+        states = [closure_state(own, folder), *map(closure_state, more)]
     except OSError:
         return None  # made from text: there is no such file
-    return cache_folder(place, hashlib.sha256("".join(states).encode()).hexdigest()[:16])
+    return cache_folder(own, hashlib.sha256("".join(states).encode()).hexdigest()[:16])
 
 
 def jit(function: F) -> F:

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from helpers import DT, place_sim, rig_of, scan_at, world_of
-from onboard.robots import (
+from robots import (
     ANGLES,
     OPEN,
     Driver,
@@ -378,7 +378,7 @@ def test_warming_up_says_what_it_did():
     said = []
     robot = Robot("nav-scope", Body(), Lidar(), address=1)
     done = robot.warm_up(said.append)
-    assert set(done.compiled) | set(done.loaded) == {"step_all", "settle", "reproject"}
+    assert set(done.compiled) | set(done.loaded) == {"step_nav_scope", "settle", "reproject"}
     assert done.seconds > 0.0
     assert said[0].startswith("nav-scope: ")
     assert robot.warm_up().compiled == ()
@@ -421,7 +421,8 @@ def test_the_zero_of_the_clock_does_not_matter():
 
 
 def test_parameters_and_options_reach_planner_and_rig():
-    robot = Robot("nav-scope", Body(), Lidar(), address=1, params={"w_i": 0}, look_ahead_m=1, clearance_m=0.05, sector=True)
+    options = {"look_ahead_m": 1, "clearance_m": 0.05, "sector": True}
+    robot = Robot("nav-scope", Body(), Lidar(), address=1, params={"w_i": 0}, **options)
     assert robot.params.w_i == 0.0
     assert robot.rows.rig.look_ahead == 1.0
     assert robot.rows.rig.guarding.clearance_m == 0.05

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from helpers import DT
-from onboard.robots import ANGLES, OPEN, Driver, LaserScan, brakes, new_robot, wall_ahead, within
+from robots import ANGLES, OPEN, Driver, LaserScan, brakes, new_robot, wall_ahead, within
 from swarmscope.errors import ConfigError, MissingExtraError, UnknownNameError
 from swarmscope.onboard.body import Body
 from swarmscope.onboard.lidar import Lidar
@@ -258,15 +258,15 @@ def test_packets_of_braking_ticks_are_not_lost():
 def test_a_planner_that_fails_brakes():
     driver = Driver()
     driver.ticks(2)
-    planner = driver.robot.rows._planner
+    planner = driver.robot.rows.planner
 
     class Broken:
         def step_all(self, *arguments):
             raise ZeroDivisionError
 
-    driver.robot.rows._planner = Broken()
+    driver.robot.rows.planner = Broken()
     assert brakes(driver.tick())
-    driver.robot.rows._planner = planner
+    driver.robot.rows.planner = planner
     assert driver.tick().v == 0.5
     assert driver.robot.faults == {"error": 1}
 
@@ -275,10 +275,10 @@ def test_a_planner_that_asks_for_the_impossible_brakes():
     driver = Driver()
 
     class Wild:
-        def step_all(self, first, last, ranges, percepts, shared, memories, decisions, *rest):
-            decisions["v"], decisions["w"] = NAN, 1e9
+        def step_all(self, first, last, swarm, memories, params):
+            swarm.decisions["v"], swarm.decisions["w"] = NAN, 1e9
 
-    driver.robot.rows._planner = Wild()
+    driver.robot.rows.planner = Wild()
     assert brakes(driver.tick())
     assert driver.robot.faults == {"planner": 1}
 
@@ -375,7 +375,8 @@ WRONG_ROBOTS = [
     ({"address": 65536}, "address"), ({"address": 1.5}, "address"), ({"address": None}, "address"),
     ({"address": NAN}, "address"), ({"rate_hz": 0.0}, "rate_hz"),
     ({"rate_hz": NAN}, "rate_hz"), ({"rate_hz": -5}, "rate_hz"), ({"look_ahead_m": NAN}, "look_ahead_m"),
-    ({"clearance_m": -0.1}, "clearance_m"), ({"margin_m": "wide"}, "margin_m"), ({"params": {"w_i": NAN}}, "planner 'nav-scope': w_i"),
+    ({"clearance_m": -0.1}, "clearance_m"), ({"margin_m": "wide"}, "margin_m"),
+    ({"params": {"w_i": NAN}}, "planner 'nav-scope': w_i"),
     ({"planner": "oracle"}, "planner"), ({"planner": None}, "planner"), ({"planner": 7}, "planner"),
 ]  # fmt: skip
 

@@ -17,7 +17,6 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from swarmscope.cli._console import PlainConsole
-from swarmscope.cli.lists import field_docs
 from swarmscope.disk import controllers, maps, user
 from swarmscope.disk.bounds import bound
 from swarmscope.disk.check import check
@@ -32,6 +31,7 @@ from swarmscope.disk.study.figures import Played, Row, csv_text, ended_words, fa
 from swarmscope.errors import ConfigError
 from swarmscope.experiments.seeds import seed_set
 from swarmscope.judging.provenance import git_revision, versions
+from swarmscope.scenarios.keys import docs_of
 from swarmscope.viewing.report.publish import put_in_place
 
 SHOWN_FAILURES = 8
@@ -179,10 +179,9 @@ def list_command() -> None:
         console.print(f"[bold]{name}[/bold]  {kind.summary}", highlight=False)
         console.print(f"  knows: {kind.knows}", highlight=False)
         console.print(f"  guarantees: {kind.guarantees}", highlight=False)
-        module = sys.modules[kind.create.__module__]
         numbers = Table("parameter", "default", "meaning")
         for key, default in kind.params._asdict().items():
-            numbers.add_row(key, str(default), field_docs(module, "Params").get(key, ""))
+            numbers.add_row(key, str(default), docs_of(type(kind.params)).get(key, ""))
         console.print(numbers)
     console.print(f"[bold]FILE.py[/bold]  a file of yours with {user.SIGNATURE}", highlight=False)
     places = Table("map", "obstacles", "what it is")

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import ast
-import inspect
-import sys
-from types import ModuleType
-
 from rich.table import Table
 
 from swarmscope.bounds import Value, about
 from swarmscope.cli._console import PlainConsole
 from swarmscope.onboard.planners import load_planner, planner_names
+from swarmscope.scenarios.keys import docs_of
 from swarmscope.tasks import load_task, task_names
 from swarmscope.tasks._contract import all_options
 
@@ -24,7 +20,7 @@ def list_planners() -> None:
         console.print(f"[bold]{name}[/bold]  {planner.summary.removeprefix(f'{name}: ')}")
         console.print(f"  is given: {planner.needs}", highlight=False)
         table = Table("planner.params", "default", "takes", "meaning")
-        docs = field_docs(planner.module, "Params")
+        docs = docs_of(planner.params_type)
         for field in planner.fields.values():
             table.add_row(field.name, str(field.default), about(field), docs.get(field.name, ""))
         console.print(table)
@@ -43,25 +39,3 @@ def list_tasks() -> None:
 
 def _short(value: Value) -> str:
     return value if isinstance(value, str) else f"{value:g}"
-
-
-def field_docs(module: ModuleType, class_name: str) -> dict[str, str]:
-    """Return the text that follows each field of a class in the source of the module that defines it."""
-    source = sys.modules[getattr(module, class_name).__module__] if hasattr(module, class_name) else module
-    for node in ast.parse(inspect.getsource(source)).body:
-        if isinstance(node, ast.ClassDef) and node.name == class_name:
-            return _texts_after_fields(node)
-    return {}
-
-
-def _texts_after_fields(node: ast.ClassDef) -> dict[str, str]:
-    docs = {}
-    for field, text in zip(node.body[:-1], node.body[1:], strict=True):
-        if (
-            isinstance(field, ast.AnnAssign)
-            and isinstance(field.target, ast.Name)
-            and isinstance(text, ast.Expr)
-            and isinstance(text.value, ast.Constant)
-        ):
-            docs[field.target.id] = " ".join(str(text.value.value).split())
-    return docs

@@ -110,6 +110,23 @@ def run(
     run_command(scenario, task, map_, planner, options, set_ or [], out, threads, pictures, not no_code)
 
 
+@app.command(
+    epilog="Examples:\n\n"
+    "[bold]swarmscope config T1 > my.yaml; swarmscope run my.yaml[/bold]\n\n"
+    "[bold]swarmscope config depository --planner dh-bug[/bold]\n\n"
+    "[bold]swarmscope config --schema > scenario.schema.json[/bold]"
+)
+def config(
+    task: Annotated[str, typer.Argument(help="Task (see 'swarmscope tasks').")] = "T1",
+    planner: Annotated[str | None, typer.Option(help="Planner (see 'swarmscope planners'), else nav-scope.")] = None,
+    schema: Annotated[bool, typer.Option("--schema", help="Print the JSON schema of scenarios instead.")] = False,
+) -> None:
+    """Print a complete scenario: every key with its default and its meaning."""
+    from swarmscope.cli.config import config_command
+
+    config_command(task, planner, schema)
+
+
 @app.command(epilog="Example: [bold]swarmscope perceive malaga_telecom_2006_sick_lms --out runs/perceive[/bold]")
 def perceive(
     scans: Annotated[str, typer.Argument(help="Scan file (.npz or .csv), or the name of a packaged one.")],

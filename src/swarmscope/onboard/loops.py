@@ -29,13 +29,16 @@ def compiled_step(decide: Callable[..., None], module: ModuleType) -> Step:
     """Return the compiled loop round the kernel ``decide`` of ``module``.
 
     It is ``_each`` with that ``decide`` among its globals, under a name of its own: so Numba keeps it on disk, which it
-    does not for functions that are given a kernel as an argument or a closure.
+    does not for functions that are given a kernel as an argument or a closure. To Numba it stands in the planner's
+    file, so that it is compiled anew when that file has changed.
     """
     name = f"step_{module.__name__.rpartition('.')[2]}"
     names = {"view_of": view_of, "perceive": perceive, "decide": decide, "guard": guard, "range": range}
-    loop = FunctionType(_each.__code__.replace(co_name=name), names, name)
+    place = decide.py_func.__code__  # type: ignore[attr-defined]
+    code = _each.__code__.replace(co_name=name, co_filename=place.co_filename, co_firstlineno=place.co_firstlineno)
+    loop = FunctionType(code, names, name)
     loop.__qualname__, loop.__module__ = name, module.__name__
-    step: Step = jit_for(loop, Path(str(module.__file__)))
+    step: Step = jit_for(loop, also=Path(__file__))
     return step
 
 

@@ -7,16 +7,21 @@ reason. ``tick`` never raises, never compiles and never waits. Every field, unit
 from __future__ import annotations
 
 import math
-import time
 from collections import Counter
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from swarmscope.errors import ConfigError, UnknownNameError
-from swarmscope.onboard.body import Body, protection_model
+from swarmscope.onboard.body import Body
+from swarmscope.onboard.data_sheets import (
+    check_address,
+    check_body,
+    check_rate,
+    options_of,
+    planner_of,
+    rig_of,
+)
 from swarmscope.onboard.edge import (
-    ADDRESSES,
     GOAL_M,
     Mail,
     Seen,
@@ -26,16 +31,14 @@ from swarmscope.onboard.edge import (
     nearest_neighbours,
     numbers,
     one_number,
-    short,
 )
-from swarmscope.onboard.lidar import Lidar, check_lidar, finite, sensor_of
-from swarmscope.onboard.perception.reproject import reproject, settle
-from swarmscope.onboard.planners import Planner, load_planner
+from swarmscope.onboard.lidar import Lidar, check_lidar
+from swarmscope.onboard.planners import Planner
 from swarmscope.onboard.reasons import STATE_NAMES
-from swarmscope.onboard.rig import GUARDING, SAFETY, SHARING, Guarding, Rig, Safety, Sharing, make_rig
 from swarmscope.onboard.rows import Rows
 from swarmscope.onboard.scans import STALE_PERIODS, Scans
 from swarmscope.onboard.trail import Pose, Trail, then
+from swarmscope.onboard.warm import WarmUp, warm_up
 
 __all__ = ["Command", "Lidar", "Robot", "Seen", "WarmUp"]
 
@@ -69,20 +72,10 @@ class Command(NamedTuple):
     """False when the robot brakes because an input could not be used."""
 
 
-class WarmUp(NamedTuple):
-    """What ``Robot.warm_up`` did."""
-
-    seconds: float
-    compiled: tuple[str, ...]
-    """Kernels that were compiled; they are on disk now, and the next start loads them."""
-    loaded: tuple[str, ...]
-    """Kernels that were there, on disk or in this process."""
-
-
 class Robot:
     """A planner at work on a robot with ``body`` and ``lidar`` and the radio ``address`` (0 to 65535).
 
-    ``planner`` is a name, a FILE.py, or what ``load_planner`` returned; ``rate_hz`` is how often you will call ``tick``;
+    ``planner`` is a name, a FILE.py, or what ``load_planner`` returned; ``rate_hz`` says how often ``tick`` is called;
     ``params`` are the planner's (docs/planners.md); ``options`` are fields of ``rig.Guarding, Safety, Sharing`` (safe
     directions, guard, packets). Raises ConfigError with the field's name, UnknownNameError, MissingExtraError.
     """
@@ -98,13 +91,11 @@ class Robot:
         params: Mapping[str, float] | None = None,
         **options: float,
     ) -> None:
-        self._planner = _planner(planner)
-        self.body, self.lidar = _check_body(body), check_lidar(lidar)
-        self.address, self.rate_hz = _check_address(address), finite(rate_hz, "rate_hz")
-        if not 0.0 < self.rate_hz <= 1000.0:
-            raise ConfigError("rate_hz", f"must be above 0 and at most 1000 Hz, not {rate_hz!r}")
+        self._planner = planner_of(planner)
+        self.body, self.lidar = check_body(body), check_lidar(lidar)
+        self.address, self.rate_hz = check_address(address), check_rate(rate_hz)
         self.params = self._planner.params(params)
-        self._options = _options(options)
+        self._options = options_of(options)
         self._period_s = 1.0 / self.rate_hz
         self.faults: Counter[str] = Counter()
         """How often what could not be used."""
@@ -125,17 +116,7 @@ class Robot:
 
     def warm_up(self, say: Callable[[str], None] | None = None) -> WarmUp:
         """Compile or load the kernels and networks that ``tick`` needs; ``say`` is told what it did."""
-        begun = time.perf_counter()
-        kernels = (*self._planner.kernels, settle, reproject)
-        before = [_compiled(kernel) for kernel in kernels]
-        _rehearse(*self._set_up())
-        names = [getattr(kernel, "__name__", str(kernel)) for kernel in kernels]
-        new = [_compiled(kernel) > count for kernel, count in zip(kernels, before, strict=True)]
-        done = WarmUp(
-            seconds=time.perf_counter() - begun,
-            compiled=tuple(name for name, fresh in zip(names, new, strict=True) if fresh),
-            loaded=tuple(name for name, fresh in zip(names, new, strict=True) if not fresh),
-        )
+        done = warm_up(self._planner, *self._set_up())
         self._warm = True
         if say is not None:
             what = f"compiled {', '.join(done.compiled)}" if done.compiled else "all kernels were compiled already"
@@ -186,7 +167,7 @@ class Robot:
         """Return fresh scans and rows."""
         clearance = float(self._options["clearance_m"])
         scans = Scans(self.lidar, self._period_s, self.body.radius_m + clearance)
-        rig = _rig(self.body, self.lidar, scans, self._options)
+        rig = rig_of(self.body, self.lidar, scans, self._options)
         return scans, Rows(self._planner, rig, self.params, self.address)
 
     def _take_time_and_motion(self, now_s: Any, moved: Any) -> None:
@@ -266,96 +247,9 @@ class Robot:
         return Command(v=0.0, w=0.0, outbox=[], reason=f"brakes: {why}", state=BRAKES, side="", ok=False)
 
 
-DEFAULTS: dict[str, Any] = {**GUARDING._asdict(), **SAFETY._asdict(), **SHARING._asdict()}
-"""Options of a robot, by the keys of a scenario."""
-
-
-def _planner(planner: str | Planner) -> Planner:
-    """Return a planner that robots can run; raises an error that says why not."""
-    if not isinstance(planner, str | Planner):
-        raise ConfigError("planner", f"must be the name of a planner, not {short(planner)}")
-    chosen = load_planner(planner) if isinstance(planner, str) else planner
-    if chosen.told:
-        raise ConfigError("planner", f"'{chosen.name}' is told the right side by somebody who knows the map")
-    chosen.check_available()
-    return chosen
-
-
-def _options(given: Mapping[str, float]) -> dict[str, Any]:
-    """Return every option as a plain number; raises ConfigError or UnknownNameError."""
-    checked = dict(DEFAULTS)
-    for name, value in given.items():
-        if name not in DEFAULTS:
-            raise UnknownNameError("option", name, DEFAULTS, "Robot")
-        if isinstance(DEFAULTS[name], bool):
-            checked[name] = bool(value)
-            continue
-        checked[name] = finite(value, name)
-        if checked[name] < 0.0:
-            raise ConfigError(name, f"must be at least 0, not {value!r}")
-    return checked
-
-
-def _part(kind: Any, options: Mapping[str, Any]) -> Any:
-    """Return the options that a named tuple has."""
-    return kind(**{name: options[name] for name in kind._fields})
-
-
-def _check_body(body: Body) -> Body:
-    checked = Body(*(finite(value, f"body.{name}") for name, value in zip(Body._fields, body, strict=True)))
-    try:
-        protection = protection_model(checked)
-    except ConfigError as error:
-        raise ConfigError(error.where.replace("robot.", "body."), error.why) from None
-    if not all(map(math.isfinite, protection)):
-        raise ConfigError("body", "its protection model is not finite")
-    return checked
-
-
-def _check_address(address: Any) -> int:
-    value = finite(address, "address")
-    if value != int(value) or not 0 <= value < ADDRESSES:
-        raise ConfigError("address", f"must be a whole number from 0 to {ADDRESSES - 1}, not {address!r}")
-    return int(value)
-
-
-def _rig(body: Body, lidar: Lidar, scans: Scans, options: Mapping[str, Any]) -> Rig:
-    """Return the robot's constants; raises ConfigError when LiDAR and body do not go together."""
-    offset = math.hypot(lidar.mount[0], lidar.mount[1])
-    if offset > body.radius_m:
-        raise ConfigError("lidar.mount", f"{offset:g} m from the centre is outside the radius {body.radius_m:g} m")
-    reach = protection_model(body).r + offset
-    if lidar.range_m < reach:
-        raise ConfigError("lidar.range_m", f"{lidar.range_m:g} m is less than this body needs to stop, {reach:.2f} m")
-    parts = (_part(kind, options) for kind in (Guarding, Safety, Sharing))
-    return make_rig(body, sensor_of(lidar, scans.grid), *parts)
-
-
 def _place(error: Exception) -> str:
     """Return where an error comes from."""
     trace = error.__traceback__
     while trace is not None and trace.tb_next is not None:
         trace = trace.tb_next
     return "?" if trace is None else f"{Path(trace.tb_frame.f_code.co_filename).name}:{trace.tb_lineno}"
-
-
-def _compiled(kernel: Any) -> int:
-    """Return how many versions of a kernel were compiled, not loaded, in this process."""
-    misses = getattr(getattr(kernel, "stats", None), "cache_misses", None)
-    return sum(misses.values()) if misses else 0
-
-
-def _rehearse(scans: Scans, rows: Rows) -> None:
-    """Let a robot that nobody will drive live through a few ticks of every kind."""
-    trail = Trail(1e9, 1.0)
-    rows.load()
-    for k in range(4):
-        now = float(k)
-        trail.add(now, (0.01 * k, 0.0, 0.01))
-        if k == 0:
-            scans.rehearse(now)
-        scans.write(trail, 0.0, rows.scan)
-        rows.scan[: rows.scan.size // 2 if k == 2 else 0] = 1.0
-        rows.fill(now_s=now, dt_s=0.2, goal_distance=5.0, goal_bearing=0.1 * k)
-        rows.see([Seen(1, 1.0, 0.5)] if k > 1 else [])
-        rows.step()

@@ -47,22 +47,27 @@ Point = tuple[Number, Number]
 class _Model(BaseModel):
     """Settings shared by all parts of the description: unknown keys are errors, values do not change."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)
 
 
 class Circle(_Model):
     """A disc: ``center`` [x, y] and ``radius`` [m], world frame."""
 
     type: Literal["circle"] = "circle"
+    """What it is."""
     center: Point
+    """x, y [m]."""
     radius: Length
+    """Its radius [m]."""
 
 
 class Polygon(_Model):
     """A solid convex polygon: ``points`` [[x, y], ...] [m], at least 3, in either orientation."""
 
     type: Literal["polygon"] = "polygon"
+    """What it is."""
     points: Annotated[list[Point], Field(min_length=3)]
+    """Its corners x, y, one after the other [m]."""
 
     @model_validator(mode="after")
     def _check_convex(self) -> Self:
@@ -74,7 +79,9 @@ class Wall(_Model):
     """A wall without thickness along the polyline ``points`` [[x, y], ...] [m], at least 2."""
 
     type: Literal["wall"] = "wall"
+    """What it is."""
     points: Annotated[list[Point], Field(min_length=2)]
+    """Its corners x, y, one after the other [m]."""
 
     @model_validator(mode="after")
     def _check_steps(self) -> Self:
@@ -91,11 +98,17 @@ class Grid(_Model):
     """
 
     type: Literal["grid"] = "grid"
+    """What it is."""
     resolution: Length
+    """Side of a cell [m]."""
     origin: Point
+    """Lower left corner x, y [m]."""
     width: Annotated[int, Field(ge=1)]
+    """Columns."""
     height: Annotated[int, Field(ge=1)]
+    """Rows."""
     rows: list[tuple[int, int, int]]
+    """Solid runs: row, first column, last column."""
 
     @model_validator(mode="after")
     def _check_runs(self) -> Self:
@@ -118,7 +131,9 @@ class WorldSpec(_Model):
     """What stands in the world: ``obstacles`` (at most one grid) and ``bounds`` [x0, y0, x1, y1] [m]."""
 
     obstacles: list[Obstacle] = Field(default_factory=list)
+    """Circles, convex polygons, walls, and at most one occupancy grid; each names its ``type``."""
     bounds: tuple[Number, Number, Number, Number]
+    """Lower left and upper right corner of the world: x0, y0, x1, y1 [m]."""
 
     @model_validator(mode="after")
     def _check_world(self) -> Self:

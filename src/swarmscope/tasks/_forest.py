@@ -52,9 +52,9 @@ class ForestOptions:
 
     size_m: Length = 20.0  # side of the square; a disc has the same area
     density: Density = 0.35  # trees per m^2
-    radius_min: Length = 0.15  # [m]
-    radius_max: Length = 0.35  # [m]
-    obstacles: Literal["trees", "rocks"] = "trees"
+    radius_min: Length = 0.15  # of the smallest tree
+    radius_max: Length = 0.35  # of the largest tree
+    obstacles: Literal["trees", "rocks"] = "trees"  # rocks are convex polygons of the same areas
 
 
 @dataclass(frozen=True)

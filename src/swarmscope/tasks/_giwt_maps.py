@@ -37,9 +37,9 @@ class MapOptions:
     """Sizes; the defaults are those of the document."""
 
     obstacles: Kind = "C"  # A rectangles, B cylinders, C both
-    size_m: Length = SIZE_M
-    fewest: Amount = FEWEST
-    most: Amount = MOST
+    size_m: Length = SIZE_M  # side of the map
+    fewest: Amount = FEWEST  # obstacles on it, at least
+    most: Amount = MOST  # and at most
     apart_m: Length = 7.0  # from a start to its goal, at least (task I)
 
 

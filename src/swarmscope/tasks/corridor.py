@@ -20,7 +20,7 @@ class CorridorOptions:
     """Sizes [m]."""
 
     width_m: Length = 1.5  # of the corridor; wider for robots that could not pass in it
-    length_m: Length = 8.0
+    length_m: Length = 8.0  # of the corridor
     room_m: Length = 4.0  # width of the rooms at both ends
     gap_m: Length = 1.2  # from the corridor to the first robots
 

@@ -36,7 +36,7 @@ Floats = NDArray[np.float64]
 class Options(MapOptions):
     """Sizes of the map, and who moves."""
 
-    moves: Literal["one", "all"] = "one"
+    moves: Literal["one", "all"] = "one"  # one: robot 0, the others stand; all: everybody
 
 
 OPTIONS = Options

@@ -36,8 +36,8 @@ class LabOptions:
     obstacles: Kind = "C"  # A rectangles, B cylinders, C both
     width_m: Length = 8.0  # wider for more robots than fit side by side
     length_m: Length = 10.0  # the way is 2 (EDGE_M + radius) shorter
-    fewest: Amount = 6.0
-    most: Amount = 12.0
+    fewest: Amount = 6.0  # obstacles on it, at least
+    most: Amount = 12.0  # and at most
 
 
 OPTIONS = LabOptions

@@ -51,7 +51,7 @@ def robot_of(name):
 
 
 def three_of(name):
-    """Rows of three robots, planner memory and parameters, in front of something different each."""
+    """The planner, the rows of three robots with goals 5 m ahead, their memory, and its parameters."""
     planner, swarm = usable(name), new_swarm(3, rig_of())
     swarm.percepts["dt_s"], swarm.percepts["goal_distance"] = DT, 5.0
     return planner, swarm, planner.new_memory(3), planner.params()

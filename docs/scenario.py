@@ -1,0 +1,155 @@
+"""Writes docs/scenario.md from the models, the tasks and the planners: python docs/scenario.py"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable
+from itertools import groupby
+from pathlib import Path
+
+import swarmscope
+from swarmscope.onboard.percept import MAX_INBOX, MAX_OUTBOX
+from swarmscope.onboard.planners import planner_names
+from swarmscope.scenarios.keys import MUST, Key, planner_keys, scenario_keys, task_keys
+from swarmscope.sim.state import QUEUE, Radio
+from swarmscope.tasks import task_names
+
+PAGE = Path(__file__).with_suffix(".md")
+PACKAGE = Path(swarmscope.__file__).parent
+
+HEAD = """# Every key of a scenario
+
+*Made by `python docs/scenario.py` from the models in `src/swarmscope/scenarios/scenario.py`: change those instead.*
+
+A scenario is one YAML file that describes one run completely. Only what differs from the defaults has to be written;
+a run folder's `config.yaml` holds everything. Exactly one of `task`, `map` and `place` says where.
+
+```sh
+swarmscope config T1 > my.yaml                   # a complete scenario, every key with its meaning
+swarmscope run my.yaml --set radio.loss=0.2      # any key of this page, over the file
+swarmscope config --schema                       # the same as JSON schema, for editors
+```
+
+```python
+swarmscope.simulate("T1", radio__loss=0.2, planner__params__w_i=0)      # the same keys, __ for the dot
+```
+
+A key that does not exist, or a value out of bounds, is an error that names the place and the nearest key.
+"""
+
+RADIO = """## What the radio does with packets
+
+Everything that a robot sends goes through its one radio of `radio.bitrate_bps`: the *bandwidth limit* of a run.
+
+- A packet of n bytes is on the air for 8 (n + {overhead}) / `radio.bitrate_bps` seconds: {overhead} bytes are the
+  link's preamble, header and checksum. A request of 7 bytes takes {request:.1f} ms by default, 26 bytes of features
+  {features:.1f} ms. All this time sender *and* receiver are occupied; other pairs are not.
+- It begins when both are free. A packet that would have to wait longer than `max_wait_s` = {wait:g} s does not fit: it
+  is dropped before it is sent, and counted in `packets_crowded_out` of `metrics.json`, not in `messages` and not in
+  `bytes_sent`. The planner is not told; it can ask again after `planner.params.ask_every_s`.
+- It arrives `radio.latency_s` after its end. A receiver holds {queue} packets that it has not taken yet; one more was
+  sent in vain and is crowded out, too. In each tick a robot is handed at most {inbox} packets, oldest first, the others
+  wait for the next tick; it sends at most {outbox}.
+- Farther than `radio.range_m`, or to a robot that has collided: sent in vain, `packets_out_of_range`. Lost by chance
+  (`radio.loss`): `packets_lost`.
+
+`max_wait_s` and the {overhead} bytes are constants of the link (`sim/state.py: Radio`), no keys. `bandwidth_kbps` of
+`metrics.json` is what was sent, not what could be. To see the limit at work: `swarmscope run --task T3 --set
+radio.bitrate_bps=2000`. Code: `sim/radio.py`; packets byte by byte: [message.md](message.md).
+"""
+
+FORMULAS = (
+    ("P_a (9)", "how sure the own features are that left is right", "Return P_a (9)", "`planner.params.prior`"),
+    ("f_ai (12)", "weight of a neighbour by its distance", "(Nav-SCOPE 12", "`planner.params.w_i`"),
+    (
+        "P_ni (14)",
+        "how sure neighbour i's features are: a logistic of its two passable distances less twice the threshold w_n",
+        "P_ni (Nav-SCOPE 14",
+        "none; w_n (20) follows from `robot.*`",
+    ),
+    ("P_dir (15)", "own and neighbours' opinions fused: left from 0.5 upward", "Return P_dir", "`planner.params.w_i`"),
+    (
+        "wait rule (17)",
+        "wait while the repulsion of a neighbour outweighs the propulsion",
+        "whether (17) holds",
+        "`planner.params.wait_s`, `planner.params.still_s`",
+    ),
+    ("radio's limit", "what happens with packets that do not fit", "refuse it or queue it", "`radio.bitrate_bps`"),
+)
+"""Formula, what it says, words in the docstrings of its code, keys."""
+
+
+def page() -> str:
+    """Return the whole page."""
+    link = Radio()
+    radio = RADIO.format(
+        overhead=link.overhead_bytes,
+        wait=link.max_wait_s,
+        queue=QUEUE,
+        inbox=MAX_INBOX,
+        outbox=MAX_OUTBOX,
+        request=8e3 * (7 + link.overhead_bytes) / link.bitrate_bps,
+        features=8e3 * (26 + link.overhead_bytes) / link.bitrate_bps,
+    )
+    parts = [HEAD, "## Keys\n", table(scenario_keys()), radio, formulas()]
+    parts += ["## Options of the tasks\n\nSet with `task.options.NAME`; what tasks are for: [tasks.md](tasks.md).\n"]
+    parts += grouped(task_names(), task_keys)
+    parts += ["## Parameters of the planners\n\nSet with `planner.params.NAME`; who: [planners.md](planners.md).\n"]
+    parts += grouped(planner_names(), planner_keys)
+    return "\n".join(parts)
+
+
+def table(keys: list[Key]) -> str:
+    """Return a table of keys."""
+    head = "| key | takes | default | unit | meaning |\n|---|---|---|---|---|\n"
+    return head + "".join(
+        f"| `{key.name}` | {key.takes} | {shown(key.default)} | {key.unit} | {key.meaning.replace('``', '`')} |\n"
+        for key in keys
+    )
+
+
+def shown(default: object) -> str:
+    """Return a default as YAML writes it."""
+    if default == MUST:
+        return f"*{MUST}*"
+    if default in (None, [], {}):
+        return "none"
+    return f"`{str(default).lower() if isinstance(default, bool) else default}`"
+
+
+def grouped(names: list[str], keys_of: Callable[[str], list[Key]]) -> list[str]:
+    """Return a table for each set of members that can be set alike."""
+    found = [(name, keys_of(name)) for name in names]
+    order = sorted(found, key=lambda item: [other[1] for other in found].index(item[1]))
+    parts = []
+    for keys, alike in groupby(order, key=lambda item: item[1]):
+        parts += [f"### {', '.join(name for name, _ in alike)}\n", table(keys) if keys else "Nothing can be set.\n"]
+    return parts
+
+
+def formulas() -> str:
+    """Return where the formulas that people look for are computed, and which keys they heed."""
+    places = functions()
+    rows = ""
+    for name, what, words, keys in FORMULAS:
+        homes = [f"`{place}`" for place, text in places.items() if words in text]
+        if not homes:
+            raise SystemExit(f"docs/scenario.py: no function says '{words}' any more; where is {name}?")
+        rows += f"| {name} | {what} | {', '.join(homes)} | {keys} |\n"
+    head = "| | what it says | code | keys |\n|---|---|---|---|\n"
+    return f"## From formulas to keys\n\nAll formulas: [theory.md](theory.md).\n\n{head}{rows}"
+
+
+def functions() -> dict[str, str]:
+    """Return the docstrings of the functions of robot and simulator by ``file: name``."""
+    found = {}
+    for file in sorted([*PACKAGE.glob("onboard/**/*.py"), *PACKAGE.glob("sim/*.py")]):
+        for node in ast.parse(file.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.FunctionDef):
+                found[f"{file.relative_to(PACKAGE).as_posix()}: {node.name}"] = ast.get_docstring(node) or ""
+    return found
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")
+    print(PAGE)

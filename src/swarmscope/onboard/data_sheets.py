@@ -1,0 +1,89 @@
+"""What a robot is made of, checked once when it is put together: planner, parameters, body, address, options."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from swarmscope.errors import ConfigError, UnknownNameError
+from swarmscope.onboard.body import Body, protection_model
+from swarmscope.onboard.edge import ADDRESSES, short
+from swarmscope.onboard.lidar import Lidar, finite, sensor_of
+from swarmscope.onboard.planners import Planner, load_planner
+from swarmscope.onboard.rig import GUARDING, SAFETY, SHARING, Guarding, Rig, Safety, Sharing, make_rig
+from swarmscope.onboard.scans import Scans
+
+DEFAULTS: dict[str, Any] = {**GUARDING._asdict(), **SAFETY._asdict(), **SHARING._asdict()}
+"""Options of a robot, by the keys of a scenario."""
+
+
+def planner_of(planner: str | Planner) -> Planner:
+    """Return a planner that robots can run; raises an error that says why not."""
+    if not isinstance(planner, str | Planner):
+        raise ConfigError("planner", f"must be the name of a planner, not {short(planner)}")
+    chosen = load_planner(planner) if isinstance(planner, str) else planner
+    if chosen.told:
+        raise ConfigError("planner", f"'{chosen.name}' is told the right side by somebody who knows the map")
+    chosen.check_available()
+    return chosen
+
+
+def options_of(given: Mapping[str, float]) -> dict[str, Any]:
+    """Return every option as a plain number; raises ConfigError or UnknownNameError."""
+    checked = dict(DEFAULTS)
+    for name, value in given.items():
+        if name not in DEFAULTS:
+            raise UnknownNameError("option", name, DEFAULTS, "Robot")
+        if isinstance(DEFAULTS[name], bool):
+            checked[name] = bool(value)
+            continue
+        checked[name] = finite(value, name)
+        if checked[name] < 0.0:
+            raise ConfigError(name, f"must be at least 0, not {value!r}")
+    return checked
+
+
+def check_body(body: Body) -> Body:
+    """Return the data sheet with plain numbers; raises ConfigError with the field's name."""
+    checked = Body(*(finite(value, f"body.{name}") for name, value in zip(Body._fields, body, strict=True)))
+    try:
+        protection = protection_model(checked)
+    except ConfigError as error:
+        raise ConfigError(error.where.replace("robot.", "body."), error.why) from None
+    if not all(map(math.isfinite, protection)):
+        raise ConfigError("body", "its protection model is not finite")
+    return checked
+
+
+def check_address(address: Any) -> int:
+    """Return the radio address; raises ConfigError."""
+    value = finite(address, "address")
+    if value != int(value) or not 0 <= value < ADDRESSES:
+        raise ConfigError("address", f"must be a whole number from 0 to {ADDRESSES - 1}, not {address!r}")
+    return int(value)
+
+
+def check_rate(rate_hz: Any) -> float:
+    """Return the rate of ticks [Hz]; raises ConfigError."""
+    value = finite(rate_hz, "rate_hz")
+    if not 0.0 < value <= 1000.0:
+        raise ConfigError("rate_hz", f"must be above 0 and at most 1000 Hz, not {rate_hz!r}")
+    return value
+
+
+def rig_of(body: Body, lidar: Lidar, scans: Scans, options: Mapping[str, Any]) -> Rig:
+    """Return the robot's constants; raises ConfigError when LiDAR and body do not go together."""
+    offset = math.hypot(lidar.mount[0], lidar.mount[1])
+    if offset > body.radius_m:
+        raise ConfigError("lidar.mount", f"{offset:g} m from the centre is outside the radius {body.radius_m:g} m")
+    reach = protection_model(body).r + offset
+    if lidar.range_m < reach:
+        raise ConfigError("lidar.range_m", f"{lidar.range_m:g} m is less than this body needs to stop, {reach:.2f} m")
+    parts = (_part(kind, options) for kind in (Guarding, Safety, Sharing))
+    return make_rig(body, sensor_of(lidar, scans.grid), *parts)
+
+
+def _part(kind: Any, options: Mapping[str, Any]) -> Any:
+    """Return the options that a named tuple has."""
+    return kind(**{name: options[name] for name in kind._fields})
