@@ -13,8 +13,9 @@ from swarmscope.judging.sides import judged_by, make_advice
 from swarmscope.onboard.planners import load_planner
 from swarmscope.onboard.reasons import ADVANCE, DECIDE, FOLLOW
 from swarmscope.onboard.sharing.message import REQUEST_BYTES, encode_request
+from swarmscope.scenarios.places import make_setup
 from swarmscope.scenarios.read import parse_scenario
-from swarmscope.scenarios.to_kernels import make_setting, make_setup
+from swarmscope.scenarios.to_kernels import make_setting
 from swarmscope.sim.loop import run
 
 TREES = [circle(-1.0, 0.3, 0.35), circle(0.6, -0.8, 0.4), circle(1.2, 0.5, 0.3), circle(-0.4, -1.6, 0.3)]

@@ -15,8 +15,9 @@ from swarmscope.geometry import point_segment_distance
 from swarmscope.onboard.perception.segments import LINE_ERROR, MAX_LINES
 from swarmscope.onboard.planners import planner_names
 from swarmscope.onboard.planning import orca
+from swarmscope.scenarios.places import make_setup
 from swarmscope.scenarios.read import parse_scenario
-from swarmscope.scenarios.to_kernels import make_setting, make_setup
+from swarmscope.scenarios.to_kernels import make_setting
 from swarmscope.sim.loop import run
 
 pytest.importorskip("navground.core", reason="the library of the extra 'orca' is not installed")
