@@ -91,11 +91,11 @@ def about(field: Field) -> str:
     low, high, unit = field.bounds
     what = "a whole number" if field.kind is int else "a number"
     if math.isfinite(low) and math.isfinite(high):
-        what += f" from {low:g} to {high:g}"
+        what += f" from {low:.10g} to {high:.10g}"
     elif math.isfinite(low):
-        what += f" >= {low:g}"
+        what += f" >= {low:.10g}"
     elif math.isfinite(high):
-        what += f" <= {high:g}"
+        what += f" <= {high:.10g}"
     return f"{what} {unit}" if unit else what
 
 
