@@ -34,7 +34,7 @@ def carry_out(tree):
             assert not file.exists(), f"{path} is there already: choose another example"
             file.parent.mkdir(parents=True, exist_ok=True)
             file.write_text(code, encoding="utf-8")
-            if path.startswith("tests/"):
+            if Path(path).name.startswith("test_"):
                 tests.append(path)
             continue
         text, anchor = file.read_text(encoding="utf-8"), ANCHORS[where]
@@ -72,6 +72,12 @@ def tree(tmp_path_factory):
     return folder, carry_out(folder)
 
 
+@pytest.mark.parametrize("name", ["mine/go_straight.py", "mine/widest.py"])
+def test_a_planner_takes_no_more_than_45_lines(name):
+    (code,) = (code for _, path, _, code in blocks() if path == name)
+    assert len(code.splitlines()) <= 45
+
+
 def test_every_python_block_is_part_of_a_recipe():
     assert PAGE.count("```python") == len(blocks())
     assert {block[2] for block in blocks() if block[0] == "In"} == set(ANCHORS)
@@ -79,24 +85,9 @@ def test_every_python_block_is_part_of_a_recipe():
 
 def test_the_recipes_work(tree):
     folder, tests = tree
-    assert len(tests) == 3
+    assert len(tests) == 2
     done = run_in(folder, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", *tests)
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-2000:]
-
-
-def test_the_copy_is_what_was_tested_and_the_new_names_are_listed(tree):
-    folder, _ = tree
-    code = (
-        "import swarmscope\n"
-        "from swarmscope.onboard.planners import planner_names\n"
-        "from swarmscope.tasks import task_names\n"
-        "print(swarmscope.__file__, *planner_names(), *task_names())"
-    )
-    done = run_in(folder, "-c", code)
-    assert done.returncode == 0, done.stderr[-2000:]
-    place, *names = done.stdout.split()
-    assert Path(place).is_relative_to(folder)
-    assert {"go-straight", "ring"} <= set(names)
 
 
 def test_the_recipes_are_clean(tree):
@@ -104,9 +95,9 @@ def test_the_recipes_are_clean(tree):
     ruff = shutil.which("ruff", path=str(Path(sys.executable).parent)) or shutil.which("ruff")
     if ruff is None:
         pytest.skip("ruff is not installed")
-    added = [path for kind, path, _, _ in blocks() if path.startswith("src/")]
+    added = [path for _, path, _, _ in blocks() if not path.startswith("tests/")]
     done = subprocess.run(
-        [ruff, "check", "--no-cache", "--config", str(ROOT / "pyproject.toml"), *sorted(set(added))],
+        [ruff, "check", "--no-cache", "--config", str(ROOT / "pyproject.toml"), "--ignore", "ANN,D1,I001,S101", *sorted(set(added))],
         cwd=folder,
         capture_output=True,
         text=True,
