@@ -43,7 +43,7 @@ while True:
     write_run(
         Path(sys.argv[1]), {"number": number}, {"number": number},
         {"number": np.full(20_000, number)}, {"number": number},
-        lambda folder: (folder / "paths.png").write_bytes(bytes([number % 256]) * 50_000),
+        extras=lambda folder: (folder / "paths.png").write_bytes(bytes([number % 256]) * 50_000),
     )
 """
 
