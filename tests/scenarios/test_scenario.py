@@ -125,7 +125,7 @@ def test_a_complete_scenario_survives_yaml_and_says_everything(values):
 def make_setting_params(scenario):
     from swarmscope.onboard.planners import load_planner
 
-    return load_planner(scenario.planner.name).Params._fields
+    return load_planner(scenario.planner.name).settings({})
 
 
 def test_options_of_every_task_can_be_given_back():
