@@ -96,8 +96,9 @@ def test_the_recipes_are_clean(tree):
     if ruff is None:
         pytest.skip("ruff is not installed")
     added = [path for _, path, _, _ in blocks() if not path.startswith("tests/")]
+    options = ["--no-cache", "--config", str(ROOT / "pyproject.toml"), "--ignore", "ANN,D1,I001,S101"]
     done = subprocess.run(
-        [ruff, "check", "--no-cache", "--config", str(ROOT / "pyproject.toml"), "--ignore", "ANN,D1,I001,S101", *sorted(set(added))],
+        [ruff, "check", *options, *sorted(set(added))],
         cwd=folder,
         capture_output=True,
         text=True,
