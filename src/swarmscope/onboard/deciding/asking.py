@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 
-from swarmscope._jit import jit
+from swarmscope._jit import jit, jit_paste
 from swarmscope.geometry import wrap_angle
 from swarmscope.onboard.perception.safety import beam_of
 from swarmscope.onboard.sharing.inbox import ask, start_round
 from swarmscope.onboard.view import View
 
 
-@jit
+@jit_paste
 def request_ahead(see: View, ahead_s: float, every_s: float) -> None:
     """Ask the neighbours in the pass band for features when an obstacle nears the planning distance."""
     if see.percept["now_s"] - see.shared["asked_s"] < every_s:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmscope._jit import jit, jit_inline, jit_inner
+from swarmscope._jit import jit, jit_inline, jit_inner, jit_paste
 from swarmscope.geometry import TWO_PI, angle_from, wrap_angle
 from swarmscope.onboard.control.unicycle import FULL_SPEED_WITHIN
 from swarmscope.onboard.control.wanting import head_for
@@ -30,25 +30,25 @@ REOPEN_AHEAD = 0.5 * math.pi
 """And only for one this near to where it looks: who turns back along the same border finds nothing new [rad]."""
 
 
-@jit
+@jit_paste
 def side_bias(see: View, prior: float) -> float:
     """Return the bias b_0 of (9) and (SFM-MAS 7): ``prior`` [1/rad] times how much shorter the turn to the left is."""
     return prior * (turn_to_safe(see, see.safe, -1) - turn_to_safe(see, see.safe, 1))
 
 
-@jit
+@jit_paste
 def begin_following(see: View, memory: Row, side: int) -> None:
     """Enter state iii on ``side`` (+1 left, -1 right)."""
     memory["side"], memory["mode"], memory["wind"] = side, FOLLOW, 0.0
     memory["target"] = see.percept["compass"] + see.percept["goal_bearing"]
 
 
-@jit
+@jit_paste
 def resume(see: View, memory: Row, resume_m: float) -> bool:
     """Follow on the last side again when a following ended less than ``resume_m`` ago; return whether it did."""
     if memory["travel"] - memory["left_at"] >= resume_m:
         return False
-    begin_following(see, memory, memory["last_side"])
+    begin_following(see, memory, int(memory["last_side"]))
     return True
 
 
@@ -59,7 +59,7 @@ def reconsider(see: View, memory: Row, loop_m: float, reopen: float) -> None:
     Less by ``reopen`` [rad] than this following has turned off the target; 0 keeps the side as printed. Changing
     back at the same place is a loop.
     """
-    side = memory["side"]
+    side = int(memory["side"])
     if reopen <= 0.0 or memory["strict"]:
         return
     other = turn_to_safe(see, see.safe, -side)
@@ -71,7 +71,7 @@ def reconsider(see: View, memory: Row, loop_m: float, reopen: float) -> None:
         begin_following(see, memory, break_loop(see, memory, loop_m, -side))
 
 
-@jit
+@jit_paste
 def advance(see: View, memory: Row, speed: float, reason: int) -> None:
     """State i: end a following, if any, and head for the goal."""
     if memory["mode"] == FOLLOW:
@@ -94,7 +94,7 @@ class Way(NamedTuple):
 @jit
 def follow(see: View, memory: Row, wide_turn: float, turn_back: float, speed: float) -> None:
     """State iii: the first safe direction on the chosen side, counted from the target (16), or from the border."""
-    side = memory["side"]
+    side = int(memory["side"])
     reason, state = R_FOLLOW, FOLLOW
     if see.out["fused"]:
         reason = see.out["reason"]

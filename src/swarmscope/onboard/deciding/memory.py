@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from swarmscope._jit import jit
+from swarmscope._jit import jit_paste
 from swarmscope.onboard.percept import Row
 from swarmscope.onboard.view import View
 
@@ -50,7 +50,7 @@ def new_memory(robots: int) -> np.ndarray:
     return memory
 
 
-@jit
+@jit_paste
 def say(see: View, memory: Row, state: int, reason: int) -> None:
     """Note state and reason for people to read."""
     see.out["state"], see.out["reason"], see.out["side"] = state, reason, memory["side"]

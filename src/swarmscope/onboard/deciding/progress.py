@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from swarmscope._jit import jit
+from swarmscope._jit import jit, jit_paste
 from swarmscope.geometry import TWO_PI
 from swarmscope.onboard.control.unicycle import arrival_speed
 from swarmscope.onboard.control.wanting import halt
@@ -22,7 +22,7 @@ LEAVE_GAIN = 0.5
 """How much closer than ever before to the goal the free way must lead for a strict following to end [m]."""
 
 
-@jit
+@jit_paste
 def arrive(see: View, memory: Row, arrive_m: float) -> bool:
     """Stand at the goal for good once it is within ``arrive_m`` [m]; return whether the robot does."""
     if memory["mode"] != ARRIVED and see.percept["goal_distance"] > arrive_m:
@@ -33,7 +33,7 @@ def arrive(see: View, memory: Row, arrive_m: float) -> bool:
     return True
 
 
-@jit
+@jit_paste
 def last_speed(see: View, arrive_m: float) -> float:
     """Return the largest speed [m/s] from which the robot still stops at its goal."""
     body = see.rig.body
@@ -41,7 +41,7 @@ def last_speed(see: View, arrive_m: float) -> float:
     return arrival_speed(way, body.v_max_mps, body.a_max_mps2, see.percept["dt_s"])
 
 
-@jit
+@jit_paste
 def is_final(see: View) -> bool:
     """Tell whether the goal is so near that only the way to the goal itself has to be free."""
     rig = see.rig

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from swarmscope._jit import jit, jit_inline, jit_inner
+from swarmscope._jit import jit, jit_inline, jit_inner, jit_paste
 from swarmscope.onboard.percept import MAX_OUTBOX, PEERS, Row
 from swarmscope.onboard.sharing.message import (
     KIND_DIRECTED_REQUEST,
@@ -125,7 +125,7 @@ def _remember(shared: Row, sender: int, count: int, angles: np.ndarray, distance
         shared["heard_distance"][slot, j] = distances[j]
 
 
-@jit
+@jit_paste
 def start_round(see: View) -> None:
     """Begin a new round of requests; answers to earlier rounds are stale from here on."""
     shared = see.shared
