@@ -11,12 +11,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from swarmscope.api import Run, load_run, simulate
     from swarmscope.onboard.body import Body
-    from swarmscope.onboard.lidar import Lidar  # type: ignore[import-not-found, unused-ignore]
-    from swarmscope.onboard.robot import (  # type: ignore[import-not-found, unused-ignore]
-        Command,
-        Robot,
-        Seen,
-    )
+    from swarmscope.onboard.lidar import Lidar
+    from swarmscope.onboard.robot import Command, Robot, Seen
     from swarmscope.scenarios.read import load_scenario
 
 __version__ = "0.1.0"

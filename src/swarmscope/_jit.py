@@ -138,10 +138,10 @@ def _take_plain_types(kernel: Any) -> None:
 
     ``turn(see, 1)`` and ``turn(see, -1)`` would be two, each with all that it calls.
     """
-    find = kernel.get_call_template
+    find, plain = kernel.get_call_template, cast("Any", types).unliteral
 
     def get_call_template(args: Any, kws: Mapping[str, Any]) -> Any:
-        return find(tuple(map(types.unliteral, args)), {k: types.unliteral(v) for k, v in kws.items()})
+        return find(tuple(map(plain, args)), {name: plain(kind) for name, kind in kws.items()})
 
     kernel.get_call_template = get_call_template
 

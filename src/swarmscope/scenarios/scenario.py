@@ -13,6 +13,7 @@ from typing import Annotated, Final, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from swarmscope.onboard.body import Body
+from swarmscope.onboard.lidar import Lidar
 from swarmscope.onboard.rig import Guarding, Safety, Sharing
 from swarmscope.sim.loop import Setting
 from swarmscope.sim.state import Noise, Radio
@@ -23,6 +24,7 @@ Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
 NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 
 BODY: Final = Body()
+LIDAR: Final = Lidar()
 NOISE: Final = Noise()
 RADIO: Final = Radio()
 GUARDING: Final = Guarding()
@@ -57,13 +59,13 @@ class RobotModel(_Strict):
 class LidarModel(_Strict):
     """The LiDAR."""
 
-    beams: Annotated[int, Field(ge=8, le=4096)] = 360
+    beams: Annotated[int, Field(ge=8, le=4096)] = LIDAR.beams
     """Beams of a scan."""
-    fov_deg: Annotated[float, Field(gt=0.0, le=360.0)] = 360.0
+    fov_deg: Annotated[float, Field(gt=0.0, le=360.0)] = LIDAR.fov_deg
     """Field of view, in the middle of which is straight ahead [°]."""
-    range_m: Positive = 5.0
+    range_m: Positive = LIDAR.range_m
     """Longest range; beyond it there is no return [m]."""
-    range_min_m: NotNegative = 0.0
+    range_min_m: NotNegative = LIDAR.range_min_m
     """Shortest range; a nearer return is invalid and counts as blocked [m]."""
     rate_hz: Annotated[float, Field(gt=0.0, le=100.0)] = 1.0 / Setting.dt
     """Scans per second; a robot decides once for each scan [Hz]."""
