@@ -20,6 +20,7 @@ from swarmscope.onboard.planners import planner_names
 from swarmscope.onboard.robot import Robot, Seen
 from swarmscope.onboard.sharing.message import (
     MAX_PACKET_BYTES,
+    Head,
     encode_directed_request,
     encode_exact_features,
     encode_features,
@@ -120,18 +121,18 @@ class Inputs:
 
 def _write(kind: int, head: tuple[int, int, int], angles: Any, distances: Any, reach: float, out: Any) -> int:
     """Write a packet of ``kind``; return its length."""
-    sender, seq, reply = head
+    answer = Head(*head)
     n = len(distances)
     if kind == 0:
-        return int(encode_request(sender, seq, out))
+        return int(encode_request(answer.sender, answer.seq, out))
     if kind == 1:
-        return int(encode_directed_request(sender, seq, float(angles[0]), out))
+        return int(encode_directed_request(answer.sender, answer.seq, float(angles[0]), out))
     if kind == 2:
-        return int(encode_features(sender, seq, reply, angles, distances, n, reach, out))
+        return int(encode_features(answer, angles, distances, n, reach, out))
     if kind == 3:
-        return int(encode_exact_features(sender, seq, reply, angles, distances, n, out))
+        return int(encode_exact_features(answer, angles, distances, n, out))
     codes = np.floor(np.abs(np.tile(angles, 8)) * 28.0).astype(np.uint8)
-    return int(encode_latent(sender, seq, reply, codes, 160, out))
+    return int(encode_latent(answer, codes, 160, out))
 
 
 def check(command: Any, robot: Robot, values: dict[str, Any]) -> None:
