@@ -11,13 +11,12 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, Self
 
-import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from swarmscope.errors import ConfigError, InputFileError, UnknownNameError, nearest_hint
+from swarmscope.errors import ConfigError, UnknownNameError, nearest_hint
 from swarmscope.experiments.seeds import seed_set
 from swarmscope.judging.metrics import BETWEEN, COUNTED, METRICS
-from swarmscope.scenarios.read import find_user_files, parse_scenario
+from swarmscope.scenarios.read import find_user_files, parse_scenario, read_yaml
 from swarmscope.scenarios.scenario import Scenario
 
 Name = Annotated[str, Field(min_length=1, max_length=60, pattern=r"^[^/\\\n]+$")]
@@ -174,14 +173,7 @@ def shipped_experiment(name: str) -> Path:
 
 def load_experiment(path: Path) -> Experiment:
     """Return the experiment in YAML file ``path``, every scenario of it checked."""
-    try:
-        values = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except UnicodeDecodeError:
-        raise InputFileError(path, "is not text") from None
-    except OSError as error:
-        raise InputFileError(path, f"cannot be read ({error.strerror})") from None
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise InputFileError(path, f"is not YAML ({' '.join(str(error).split())})") from None
+    values = read_yaml(path)
     if isinstance(values, dict):
         for keys in _scenarios_in(values):
             find_user_files(keys, path.parent)

@@ -41,16 +41,21 @@ def _check_known(kind: str, name: str, names: list[str], where: str) -> None:
         raise UnknownNameError(kind, name, names, f"{where}: {kind}.name")
 
 
-def read_scenario_file(path: Path) -> dict[str, Any]:
-    """Return the mapping in YAML file ``path``, not validated yet; files are looked for beside it."""
+def read_yaml(path: Path) -> Any:
+    """Return what a YAML file holds. Errors: InputFileError."""
     try:
-        values = yaml.safe_load(path.read_text(encoding="utf-8"))
+        return yaml.safe_load(path.read_text(encoding="utf-8"))
     except UnicodeDecodeError:
         raise InputFileError(path, "is not text") from None
     except OSError as error:
         raise InputFileError(path, f"cannot be read ({error.strerror})") from None
     except (yaml.YAMLError, ValueError, RecursionError) as error:
         raise InputFileError(path, f"is not YAML ({' '.join(str(error).split())})") from None
+
+
+def read_scenario_file(path: Path) -> dict[str, Any]:
+    """Return the mapping in YAML file ``path``, not validated yet; files are looked for beside it."""
+    values = read_yaml(path)
     if not isinstance(values, dict):
         raise ConfigError(str(path), "a scenario is a mapping of keys to values")
     find_user_files(values, path.parent)

@@ -117,11 +117,6 @@ def shipped(planner: str, network: str) -> Model:
     return Model(planner, SHIPPED / planner.replace("-", "_"), frozenset({network}))
 
 
-def check_runtime(planner: str) -> None:
-    """Raise a MissingExtraError when ONNX Runtime is not installed."""
-    _runtime(planner)
-
-
 def read_card(folder: Path, networks: frozenset[str] = frozenset(NETWORKS)) -> dict[str, Any]:
     """Return the checked content of a model's ``model.json``, with its own hash as ``sha256``.
 
