@@ -9,7 +9,7 @@ import pytest
 
 from swarmscope.errors import ConfigError, InputFileError
 from swarmscope.learning import generate as generate_module
-from swarmscope.learning.generate import data_card, generate, make_shard, parse_set, totals, verify
+from swarmscope.learning.generate import data_card, generate, parse_set, totals, verify
 from swarmscope.learning.records import (
     MANIFEST,
     SCHEMA,
@@ -25,11 +25,14 @@ from swarmscope.learning.records import (
 )
 from swarmscope.learning.scenes import Counts, samples_of
 
+SAMPLES, MAPS = 100, 25
+"""Three shards of set B-II, one of C-II-driven."""
+
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     place = tmp_path_factory.mktemp("data")
-    generate(place, ["B-II", "A-I-driven"], 300, workers=2)
+    generate(place, ["B-II", "C-II-driven"], SAMPLES, workers=2, maps=MAPS)
     return place
 
 
@@ -37,7 +40,7 @@ def test_sets_are_large_enough_whole_and_described(folder):
     manifest = verify(folder)
     for name, row in totals(manifest).items():
         shard = load(folder)[name]
-        assert row["samples"] == shard.samples >= 300
+        assert row["samples"] == shard.samples >= SAMPLES
         assert row["train"] + row["validation"] + row["test"] == shard.samples
         assert 0.3 < row["left"] / shard.samples < 0.7
         assert name in (folder / "README.md").read_text()
@@ -65,15 +68,17 @@ def test_a_shard_holds_its_samples(folder):
 
 
 def test_data_does_not_depend_on_the_number_of_workers_and_grows_by_shards(folder, tmp_path):
-    again = generate(tmp_path / "again", ["B-II"], 300, workers=1)
     before = json.loads((folder / MANIFEST).read_text())["sets"]["B-II"]["shards"]
+    assert len(before) >= 2 and [s["first_map"] - before[0]["first_map"] for s in before[:2]] == [0, MAPS]
+    generate(tmp_path / "again", ["B-II"], before[0]["samples"], workers=1, maps=MAPS)
+    first = read_manifest(tmp_path / "again")["sets"]["B-II"]["shards"]
+    assert first == before[:1]
+    again = generate(tmp_path / "again", ["B-II"], SAMPLES, workers=1, maps=MAPS)
     assert again["sets"]["B-II"]["shards"] == before
-    more = generate(tmp_path / "again", ["B-II"], before[0]["samples"] + 1, workers=1)
-    assert more["sets"]["B-II"]["shards"][:1] == before[:1] and len(more["sets"]["B-II"]["shards"]) >= 2
 
 
 def test_bytes_read_and_selected(folder, tmp_path):
-    shard = load(folder, ["A-I-driven"])["A-I-driven"]
+    shard = load(folder, ["C-II-driven"])["C-II-driven"]
     path = tmp_path / "shard.npz"
     path.write_bytes(to_bytes(shard))
     again = read_shard(path)
@@ -193,8 +198,8 @@ def test_a_generation_that_got_nowhere_can_go_on(tmp_path, monkeypatch):
 
 def test_the_key_of_data_is_that_of_its_shards(folder):
     manifest = read_manifest(folder)
-    key = content_key(manifest, ["B-II", "A-I-driven"])
-    assert key == content_key(manifest, ["A-I-driven", "B-II"]) != content_key(manifest, ["B-II"])
+    key = content_key(manifest, ["B-II", "C-II-driven"])
+    assert key == content_key(manifest, ["C-II-driven", "B-II"]) != content_key(manifest, ["B-II"])
 
 
 def test_a_missing_set_is_named(folder):
@@ -202,11 +207,10 @@ def test_a_missing_set_is_named(folder):
         load(folder, ["C-I"])
 
 
-def test_driven_samples_are_the_key_points_of_the_runs():
-    _, about = make_shard(parse_set("C-II-driven"), 0)
-    counts = about["counts"]
-    assert counts["looked_at"] == sum(counts[k] for k in ("unreachable", "nothing_ahead", "tie", "labelled"))
-    assert counts["labelled"] == about["samples"] > 300
+def test_driven_samples_are_the_key_points_of_the_runs(folder):
+    row = totals(read_manifest(folder))["C-II-driven"]
+    assert row["looked_at"] == sum(row[k] for k in ("unreachable", "nothing_ahead", "tie", "labelled"))
+    assert row["labelled"] == row["samples"] > 5 * MAPS
 
 
 def test_views_are_turned_to_the_target_and_mirrored_about_it(folder):

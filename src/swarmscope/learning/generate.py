@@ -7,6 +7,7 @@ together hold enough samples.
 from __future__ import annotations
 
 import hashlib
+import math
 import multiprocessing
 import os
 from collections.abc import Callable
@@ -57,8 +58,13 @@ class SetName(NamedTuple):
 
     @property
     def maps_in_a_shard(self) -> int:
-        """How many maps a shard is taken from."""
+        """How many maps a shard is usually taken from."""
         return 400 if self.sampling == "placed" else 100
+
+    @property
+    def samples_of_a_map(self) -> float:
+        """About how many samples a map gives, at least."""
+        return 1.5 if self.sampling == "placed" else 7.5
 
 
 PLACED = [f"{kind}-{task}" for task in ("I", "II") for kind in "ABC"]
@@ -77,12 +83,18 @@ def parse_set(text: str) -> SetName:
 
 
 def generate(
-    folder: Path, names: list[str], samples: int, workers: int | None = None, report: Report | None = None
+    folder: Path,
+    names: list[str],
+    samples: int,
+    workers: int | None = None,
+    report: Report | None = None,
+    maps: int | None = None,
 ) -> dict[str, Any]:
     """Bring the sets ``names`` in ``folder`` to at least ``samples`` samples each; return the manifest.
 
-    Shards that are there already are kept, whatever state of the rules they were made by. Raises ConfigError when the
-    folder holds something else.
+    Shards that are there already are kept, whatever state of the rules they were made by; new ones are taken from
+    ``maps`` maps each, by default as many as is usual for the set. A single worker is this process itself. Raises
+    ConfigError when the folder holds something else.
     """
     chosen = [parse_set(name) for name in names]
     if samples < 1:
@@ -93,7 +105,8 @@ def generate(
     pool = ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), initializer=start_worker)
     try:
         for one in chosen:
-            _fill(folder, manifest, one, samples, pool, workers, report)
+            shards = _Shards(one, maps or one.maps_in_a_shard, None if workers == 1 else pool, workers)
+            _fill(folder, manifest, shards, samples, report)
     except BrokenProcessPool:
         why = "a worker process died (out of memory?); start again with --workers 1: nothing is lost"
         raise SwarmscopeError(why) from None
@@ -115,42 +128,57 @@ def _open(folder: Path) -> dict[str, Any]:
     return about | {"sets": {}}
 
 
-def _fill(
-    folder: Path,
-    manifest: dict[str, Any],
-    one: SetName,
-    samples: int,
-    pool: ProcessPoolExecutor,
-    workers: int,
-    report: Report | None,
-) -> None:
+class _Shards:
+    """The next shards of one set, made in this process or, some ahead, by others."""
+
+    def __init__(self, one: SetName, maps: int, pool: ProcessPoolExecutor | None, workers: int) -> None:
+        self.one = one
+        self._maps, self._pool, self._workers = maps, pool, workers
+        self._pending: dict[int, Future[tuple[bytes, dict[str, Any]]]] = {}
+
+    def next(self, begin: int, missing: float) -> tuple[bytes, dict[str, Any]]:
+        """Return the shard from map ``begin`` of the set on; samples of about ``missing`` maps are still wanted."""
+        if self._pool is None:
+            return make_shard(self.one, begin, self._maps)
+        wanted = math.ceil(missing / self._maps)  # what is begun ahead and not wanted keeps the cores from others
+        for k in range(min(wanted, self._workers + 1)):
+            first = begin + k * self._maps
+            if first not in self._pending:
+                self._pending[first] = self._pool.submit(make_shard, self.one, first, self._maps)
+        return self._pending.pop(begin).result()
+
+    def stop(self) -> None:
+        """Drop what has not begun."""
+        for future in self._pending.values():
+            future.cancel()
+
+
+def _fill(folder: Path, manifest: dict[str, Any], source: _Shards, samples: int, report: Report | None) -> None:
     """Append shards to one set until it is large enough."""
-    entry = manifest["sets"].setdefault(one.text, {"shards": []})
+    name = source.one.text
+    entry = manifest["sets"].setdefault(name, {"shards": []})
     shards: list[dict[str, Any]] = entry["shards"]
-    total = sum(s["samples"] for s in shards)
+    total, maps = (sum(s[key] for s in shards) for key in ("samples", "maps"))
     if report is not None:
-        report(one.text, total, samples)
-    pending: dict[int, Future[tuple[bytes, dict[str, Any]]]] = {}
+        report(name, total, samples)
     while total < samples:
-        for ahead in range(len(shards), len(shards) + workers + 1):
-            if ahead not in pending:
-                pending[ahead] = pool.submit(make_shard, one, ahead)
-        data, about = pending.pop(len(shards)).result()
-        file = f"{one.text}/shard-{len(shards):05d}.npz"
+        of_a_map = max(total, 1) / maps if maps else source.one.samples_of_a_map
+        data, about = source.next(maps, (samples - total) / of_a_map)
+        file = f"{name}/shard-{len(shards):05d}.npz"
         write_atomically(folder / file, data)
         shards.append({"file": file, "sha256": hashlib.sha256(data).hexdigest(), "git": git_revision(), **about})
         write_manifest(folder, manifest)
         total += about["samples"]
+        maps += about["maps"]
         if report is not None:
-            report(one.text, total, samples)
-    for future in pending.values():
-        future.cancel()
+            report(name, total, samples)
+    source.stop()
 
 
-def make_shard(one: SetName, index: int) -> tuple[bytes, dict[str, Any]]:
-    """Return shard ``index`` of a set as bytes, and what the manifest says of it."""
-    offset = SEED_STEP * (1 + (PLACED + DRIVEN).index(one.text))
-    seeds = range(offset + index * one.maps_in_a_shard, offset + (index + 1) * one.maps_in_a_shard)
+def make_shard(one: SetName, begin: int, maps: int) -> tuple[bytes, dict[str, Any]]:
+    """Return the shard of a set's maps ``begin`` to ``begin + maps - 1`` as bytes, and what the manifest says of it."""
+    offset = SEED_STEP * (1 + (PLACED + DRIVEN).index(one.text)) + begin
+    seeds = range(offset, offset + maps)
     counts = Counts()
     found = [(seed, s) for seed in seeds for s in samples_of(one.kind, one.task, one.sampling, seed, counts)]
     shard = pack(found)
