@@ -17,7 +17,6 @@ from typing import Any, cast
 import numpy as np
 import torch
 from torch import Tensor, nn
-from torch_geometric.nn import GATConv, SAGEConv
 
 from swarmscope.errors import InputFileError, MissingExtraError, SwarmscopeError
 from swarmscope.learning.checkpoints import Checkpoint, read, restore_model, sha256_of
@@ -52,12 +51,13 @@ class StarPeer(nn.Module):
 
     def __init__(self, peer: Peer) -> None:
         super().__init__()
-        self.layer = peer.layer
+        self.layer: Any = peer.layer
+        self.attends = peer.attends
 
     def forward(self, features: Tensor, cells: Tensor, gains: Tensor, present: Tensor) -> Tensor:
         """Return h (B, F); ``cells`` and ``gains`` are not used."""
         layer = self.layer
-        if isinstance(layer, GATConv):
+        if self.attends:
             fused = layer.lin(features).unflatten(-1, (layer.heads, -1))
             source = (fused * layer.att_src[0]).sum(-1)
             target = (fused[:, :1] * layer.att_dst[0]).sum(-1)
@@ -66,7 +66,6 @@ class StarPeer(nn.Module):
             weights = torch.softmax(scores + FAR_BELOW * (1.0 - there), dim=1) * there
             summed = (weights.unsqueeze(-1) * fused).sum(dim=1).flatten(1)
             return torch.relu(summed + layer.res(features[:, 0]) + layer.bias)
-        assert isinstance(layer, SAGEConv)  # noqa: S101 - a Peer has one of the two
         others = present[:, 1:].unsqueeze(-1)
         mean = (features[:, 1:] * others).sum(dim=1) / others.sum(dim=1).clamp(min=1.0)
         return torch.relu(layer.lin_l(mean) + layer.lin_r(features[:, 0]))

@@ -26,7 +26,6 @@ from typing import Literal
 
 import torch
 from torch import Tensor, nn
-from torch_geometric.nn import GATConv, SAGEConv
 
 from swarmscope.onboard.network.graph import FEATURES, GRID
 from swarmscope.onboard.network.local_map import CELLS, CHANNELS
@@ -127,9 +126,9 @@ class Giwt(nn.Module):
 class Peer(nn.Module):
     """A layer of PyTorch Geometric over the star from the neighbours to the decider."""
 
-    def __init__(self, layer: GATConv | SAGEConv) -> None:
+    def __init__(self, layer: nn.Module, attends: bool) -> None:
         super().__init__()
-        self.layer = layer
+        self.layer, self.attends = layer, attends
 
     def forward(self, features: Tensor, cells: Tensor, gains: Tensor, present: Tensor) -> Tensor:
         """Return h (B, F); ``cells`` and ``gains`` are not used."""
@@ -137,7 +136,7 @@ class Peer(nn.Module):
         row, column = torch.nonzero(present[:, 1:] > 0.5, as_tuple=True)
         edges = torch.stack([row * width + column + 1, row * width])
         own = torch.arange(batch, device=features.device) * width
-        if isinstance(self.layer, GATConv):
+        if self.attends:
             edges = torch.cat([edges, torch.stack([own, own])], dim=1)  # attention includes the robot itself
         out: Tensor = self.layer(features.reshape(batch * width, -1), edges)
         return torch.relu(out[own])
@@ -176,9 +175,11 @@ class Chooser(nn.Module):
 def _fusion(architecture: Architecture) -> nn.Module:
     if architecture.network == "giwt":
         return Giwt(architecture.use_gain, architecture.use_position, architecture.as_printed)
+    if architecture.network == "cnn":
+        return Alone()
+    from torch_geometric.nn import GATConv, SAGEConv  # takes longer to import than all else: for its layers only
+
     if architecture.network == "gat":
         width = FEATURES // HEADS
-        return Peer(GATConv(FEATURES, width, HEADS, negative_slope=SLOPE, add_self_loops=False, residual=True))
-    if architecture.network == "graphsage":
-        return Peer(SAGEConv(FEATURES, FEATURES))
-    return Alone()
+        return Peer(GATConv(FEATURES, width, HEADS, negative_slope=SLOPE, add_self_loops=False, residual=True), True)
+    return Peer(SAGEConv(FEATURES, FEATURES), False)

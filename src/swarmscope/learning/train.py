@@ -13,6 +13,7 @@ import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NamedTuple, cast
 
@@ -168,9 +169,7 @@ def place(model: Chooser, device: torch.device) -> Chooser:
 
 def all_versions() -> dict[str, str]:
     """Return the versions that a trained model depends on."""
-    import torch_geometric
-
-    return versions() | {"torch": torch.__version__, "torch_geometric": torch_geometric.__version__}
+    return versions() | {"torch": torch.__version__, "torch_geometric": version("torch_geometric")}
 
 
 def read_splits(config: TrainingConfig, data: Path) -> tuple[Shard, Shard]:
