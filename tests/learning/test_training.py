@@ -4,12 +4,14 @@ import hashlib
 import json
 import math
 import shutil
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
 
 torch = pytest.importorskip("torch")
-pytest.importorskip("torch_geometric")
+if find_spec("torch_geometric") is None:  # its import takes longer than most tests, and few of them need it
+    pytest.skip("needs torch_geometric", allow_module_level=True)
 
 from safetensors.torch import save  # noqa: E402
 
@@ -33,7 +35,10 @@ from swarmscope.learning.scenes import robot  # noqa: E402
 from swarmscope.onboard.network.answering import draw  # noqa: E402
 from swarmscope.onboard.network.local_map import CELL_DISTANCE  # noqa: E402
 
-SMALL = {"sets": ["A-II-driven"], "channels": [4, 8, 8], "batch": 32, "threads": 2, "precision": "float32"}
+SMALL = {"sets": ["B-I"], "channels": [4, 8, 8], "batch": 32, "threads": 1, "precision": "float32"}
+"""One thread: several wait for each other most of the time where tests run beside each other."""
+
+pytestmark = pytest.mark.filterwarnings("ignore:.torch.jit.script. is deprecated")  # says torch_geometric's import
 
 VIEW = View(5.0, 5.0)
 FAR = np.full(40, 5.0)
@@ -42,7 +47,7 @@ FAR = np.full(40, 5.0)
 @pytest.fixture(scope="module")
 def data(tmp_path_factory):
     place = tmp_path_factory.mktemp("data")
-    generate(place, ["A-II-driven"], 3000, workers=2)
+    generate(place, ["B-I"], 700, workers=1, maps=60)
     return place
 
 
@@ -51,15 +56,15 @@ def config(**more):
 
 
 def test_a_tiny_network_learns_more_than_the_majority(data, tmp_path):
-    chosen = config(channels=[8, 16, 16], epochs=4, samples_per_epoch=1500, learning_rate=3e-3)
+    chosen = config(channels=[8, 16, 16], epochs=3, samples_per_epoch=400, learning_rate=3e-3)
     history = train.train(chosen, data, tmp_path / "run")
-    test = read_test(data, ["A-II-driven"])["A-II-driven"]
+    test = read_test(data, ["B-I"])["B-I"]
     most = majority(test)
     chance = -(most * np.log(most) + (1.0 - most) * np.log(1.0 - most))
-    assert min(row["validation_loss"] for row in history) < chance - 0.05
+    assert min(row["validation_loss"] for row in history) < chance - 0.15
     verdict = judge(open_trained(tmp_path / "run"), test)
     score = share(verdict.hit, verdict.map)
-    assert most + 0.03 < score.value and score.low < score.value < score.high
+    assert most + 0.2 < score.value and score.low < score.value < score.high
     assert scores_of([verdict], [verdict])["first_ahead"].value == 0.0
     assert any((tmp_path / "run" / "tensorboard").iterdir())
 
@@ -121,7 +126,7 @@ def test_another_training_does_not_go_on_in_the_same_folder(data, tmp_path):
     fewer = tmp_path / "fewer"
     shutil.copytree(data, fewer)
     manifest = read_manifest(fewer)
-    del manifest["sets"]["A-II-driven"]["shards"][-1]
+    del manifest["sets"]["B-I"]["shards"][-1]
     write_manifest(fewer, manifest)
     with pytest.raises(ConfigError, match="on other data"):
         train.train(config(epochs=2, **short), fewer, tmp_path / "run")
@@ -203,14 +208,14 @@ def test_a_split_without_samples_is_named(data, tmp_path):
     none = tmp_path / "none"
     shutil.copytree(data, none)
     manifest = read_manifest(none)
-    entry = manifest["sets"]["A-II-driven"]
-    shard = load(none)["A-II-driven"]
+    entry = manifest["sets"]["B-I"]
+    shard = load(none)["B-I"]
     part = to_bytes(select(shard, split_of(shard.map) == 0))
     (none / entry["shards"][0]["file"]).write_bytes(part)
     entry["shards"] = [entry["shards"][0] | {"sha256": hashlib.sha256(part).hexdigest()}]
     write_manifest(none, manifest)
-    with pytest.raises(ConfigError, match="'A-II-driven' has no test samples"):
-        read_test(none, ["A-II-driven"])
+    with pytest.raises(ConfigError, match="'B-I' has no test samples"):
+        read_test(none, ["B-I"])
     with pytest.raises(ConfigError, match="no samples for training or for validation"):
         train.train(config(), none, tmp_path / "run")
 
@@ -251,7 +256,7 @@ def test_absent_robots_and_their_order_do_not_matter(variant, data):
 
 
 def test_a_mirrored_sample_is_the_sample_of_the_mirrored_world(data):
-    shard = load(data)["A-II-driven"]
+    shard = load(data)["B-I"]
     chosen = np.arange(40)
     plain = make_batch(shard, chosen, np.zeros(40, bool), FAR, VIEW)
     mirrored = make_batch(shard, chosen, np.ones(40, bool), FAR, VIEW)
@@ -262,7 +267,7 @@ def test_a_mirrored_sample_is_the_sample_of_the_mirrored_world(data):
 
 
 def test_a_picture_in_a_batch_is_what_the_planner_draws(data):
-    shard, rig = load(data)["A-II-driven"], robot()[2]
+    shard, rig = load(data)["B-I"], robot()[2]
     batch = make_batch(shard, np.arange(40), np.zeros(40, bool), FAR, VIEW)
     picture = np.empty(batch.maps.shape[1:], np.float32)
     for e, (scan, target) in enumerate(zip(shard.node_scan, shard.node_target, strict=True)):
@@ -274,7 +279,7 @@ def test_a_picture_in_a_batch_is_what_the_planner_draws(data):
 
 
 def test_robots_that_see_less_far_have_less_in_their_pictures_and_gain_more(data):
-    shard = load(data)["A-II-driven"]
+    shard = load(data)["B-I"]
     far, near = (make_batch(shard, np.arange(40), np.zeros(40, bool), np.full(40, s), VIEW) for s in (5.0, 2.0))
     seen = CELL_DISTANCE * 0.1 <= 2.0 + 1e-6
     assert np.array_equal(near.maps[:, :, seen], far.maps[:, :, seen]) and not near.maps[:, :, ~seen].any()
@@ -284,7 +289,7 @@ def test_robots_that_see_less_far_have_less_in_their_pictures_and_gain_more(data
 
 
 def test_features_of_others_come_in_bytes_and_the_own_ones_exactly(data):
-    shard = load(data)["A-II-driven"]
+    shard = load(data)["B-I"]
     batch = make_batch(shard, np.arange(40), np.zeros(40, bool), FAR, VIEW)
     features = torch.randn(len(batch.maps), 128)
     sent = as_sent(features, batch)
