@@ -88,7 +88,7 @@ def start(what, file, store, *more):
     return subprocess.Popen(list(map(str, command)), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
-def wait_for(condition, seconds=120.0):
+def wait_for(condition, seconds=600.0):  # where no kernels are on disk and the machine is busy, it takes minutes
     end = time.monotonic() + seconds
     while not condition():
         assert time.monotonic() < end, "waited in vain"
@@ -105,13 +105,13 @@ def count(path):
 def test_kill_9_of_everything_loses_only_what_was_under_way(tmp_path, truth):
     file, path = write_experiment(tmp_path), tmp_path / "s.sqlite"
     process = start("run", file, path)
-    wait_for(lambda: count(path) >= 5)
+    wait_for(lambda: count(path) >= 5 or process.poll() is not None)
     workers = children(process.pid)
     process.kill()
     process.communicate()
     kept = count(path)
     assert 5 <= kept < RUNS
-    wait_for(lambda: not any(os.path.exists(f"/proc/{w}") for w in workers), 20.0)  # nobody outlives the driver
+    wait_for(lambda: not any(os.path.exists(f"/proc/{w}") for w in workers), 60.0)  # nobody outlives the driver
     resumed = start("resume", file, path, *HERE)
     _, said = resumed.communicate(timeout=180)
     assert resumed.returncode == 0, said
@@ -124,9 +124,9 @@ def test_ctrl_c_says_how_to_go_on(tmp_path):
     few = {"places": {"near": VALUES["places"]["near"]}, "planners": {"Nav-SCOPE": VALUES["planners"]["Nav-SCOPE"]}}
     file, path = write_experiment(tmp_path, seeds="1000-1199", sweeps=[], **few), tmp_path / "s.sqlite"
     process = start("run", file, path)
-    wait_for(lambda: count(path) >= 2)
+    wait_for(lambda: count(path) >= 2 or process.poll() is not None)
     process.send_signal(signal.SIGINT)
-    _, said = process.communicate(timeout=60)
+    _, said = process.communicate(timeout=180)
     assert process.returncode == 130
     assert "finished runs are kept" in said and "Traceback" not in said
     assert count(path) >= 2
