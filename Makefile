@@ -15,6 +15,9 @@ CODE  := src tests benchmarks examples
 # Compiled kernels stay in the clone (one folder for each state of the sources, see src/swarmscope/_jit.py).
 export SWARMSCOPE_CACHE = $(CURDIR)/.numba_cache
 
+# Without byte code every process that imports PyTorch or scikit-learn compiles them from source: half a minute.
+unexport PYTHONDONTWRITEBYTECODE
+
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .PHONY: help run test check fuzz golden bench setup setup-dev clean

@@ -2,6 +2,7 @@
 
 import multiprocessing
 import pickle
+import time
 
 import pytest
 
@@ -9,7 +10,8 @@ from swarmscope.disk import maps, rules, runs, user
 from swarmscope.disk.study.batches import Choice, play_all
 from swarmscope.errors import ConfigError, InputFileError, UnknownNameError
 
-SLOW_S = 60
+SLOW_S = 600
+"""So long that the run which fails is always the first to end, however busy the machine is."""
 
 
 def two_runs():
@@ -27,10 +29,12 @@ def test_an_error_in_one_process_stops_the_others(tmp_path):
     before = multiprocessing.active_children()  # other tests may have left some that still finish
     with pytest.raises(user.UserControllerError, match="permutation 1,0: returned nothing"):
         play_all(Choice(str(mine)), two_runs(), 2)
-    left = [process for process in multiprocessing.active_children() if process not in before]
-    for process in left:
-        process.join(10)
-    assert not any(process.is_alive() for process in left)
+    # Asked again and again: a thread of the pool waits for the same processes, and where it was told of an end and has
+    # not noted it yet, they still count as alive for a moment.
+    end = time.monotonic() + 60
+    while left := set(multiprocessing.active_children()) - set(before):
+        assert time.monotonic() < end, left
+        time.sleep(0.02)
 
 
 def test_what_is_wrong_with_a_file_is_told_by_processes_too(tmp_path):

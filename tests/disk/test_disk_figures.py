@@ -2,6 +2,7 @@
 
 import csv
 import io
+from functools import cache
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from swarmscope.errors import ConfigError, InputFileError, UnknownNameError
 SOME = [(0, 1, 2, 3, 4), (0, 1, 2, 4, 3), (4, 3, 2, 1, 0)]
 
 
+@cache
 def report(names=("one-disc", "minima"), **changes):
     of = runs.problem(rules.Rules(**changes), [maps.NAMED[name] for name in names], SOME)
     choice = Choice("report")

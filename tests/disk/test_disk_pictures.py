@@ -77,16 +77,17 @@ def test_shortest_ways_end_at_the_goals():
 
 
 def test_the_field_shows_equipotentials_where_there_is_a_potential_and_circling_where_it_is():
-    def picture(name):
+    def picture(name, coarse):
         situation = Situation(controllers.find(name), maps.NAMED["minima"], rules.Rules(), (0, 1, 2, 4, 3), 2, None)
-        return image(pictures.field_png(situation, basins(situation, 61)))
+        pixels = image(pictures.field_png(situation, basins(situation, 25, coarse), coarse))
+        green = (pixels[..., 1] > pixels[..., 0] + 40) & (pixels[..., 1] > pixels[..., 2] + 40)
+        pink = (pixels[..., 0] > pixels[..., 1] + 25) & (pixels[..., 2] > pixels[..., 1] + 10)
+        return green.sum(), pink.sum()
 
-    smooth, report = picture("navigation-function"), picture("report")
-    green = (smooth[..., 1] > smooth[..., 0] + 40) & (smooth[..., 1] > smooth[..., 2] + 40)
-    pink = (report[..., 0] > report[..., 1] + 25) & (report[..., 2] > report[..., 1] + 10)
-    assert green.sum() > 1000 and pink.sum() > 1000
-    green = (report[..., 1] > report[..., 0] + 40) & (report[..., 1] > report[..., 2] + 40)
-    assert green.sum() < 1000
+    green, pink = picture("navigation-function", 5.0)
+    assert green > 4000 and pink < 1000
+    green, pink = picture("report", 2.0)  # it circles in steps as short as these
+    assert green < 1000 and pink > 4000
 
 
 def test_several_controllers_side_by_side():

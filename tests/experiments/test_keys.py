@@ -13,14 +13,20 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 CODE = """
-import json, sys
+import json, os, sys
 from swarmscope.experiments.work import unit_key, world_key
 from swarmscope.scenarios.read import parse_scenario
-found = {}
-for label, keys in json.loads(sys.argv[1]).items():
-    scenario = parse_scenario(keys, label)
-    found[label] = [unit_key(scenario), world_key(scenario)]
-print(json.dumps(found))
+for line in sys.stdin:
+    if os.fork():
+        if os.wait()[1]:
+            print("null", flush=True)
+        continue
+    found = {}
+    for label, keys in json.loads(line).items():
+        scenario = parse_scenario(keys, label)
+        found[label] = [unit_key(scenario), world_key(scenario)]
+    print(json.dumps(found), flush=True)
+    os._exit(0)
 """
 RUNS = {
     "nav": {"task": {"name": "T1"}, "planner": {"name": "nav-scope"}},
@@ -39,23 +45,36 @@ def tree(tmp_path_factory):
     return folder
 
 
-def keys_in(tree, runs=RUNS):
-    """The keys (of the unit, of its world) of every run."""
-    done = subprocess.run(
-        [sys.executable, "-c", CODE, json.dumps(runs)],
+@pytest.fixture(scope="module")
+def keys_of(tree):
+    """A function that returns the keys (of the unit, of its world) of runs.
+
+    Every call is answered by a fork of one process that has imported everything and read nothing: a process of its own,
+    without the seconds that imports take.
+    """
+    with subprocess.Popen(
+        [sys.executable, "-c", CODE],
         cwd=tree,
         env=os.environ | {"NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(tree / "src")},
-        capture_output=True,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
         text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr[-2000:]
-    return json.loads(done.stdout)
+    ) as asked:
+
+        def ask(runs=RUNS):
+            asked.stdin.write(json.dumps(runs) + "\n")
+            asked.stdin.flush()
+            found = json.loads(asked.stdout.readline())
+            assert found is not None, "it failed; what it said is among the captured output"
+            return found
+
+        yield ask
+        asked.stdin.close()
 
 
 @pytest.fixture(scope="module")
-def before(tree):
-    return keys_in(tree)
+def before(keys_of):
+    return keys_of()
 
 
 @pytest.mark.parametrize(
@@ -79,19 +98,19 @@ def before(tree):
         ("sim/world.py", EVERY, EVERY),
     ],
 )
-def test_a_blank_line_changes_the_keys_of_what_imports_the_file(tree, before, file, units, worlds):
+def test_a_blank_line_changes_the_keys_of_what_imports_the_file(tree, keys_of, before, file, units, worlds):
     path = tree / "src/swarmscope" / file
     text = path.read_text(encoding="utf-8")
     path.write_text(text + "\n", encoding="utf-8")
     try:
-        after = keys_in(tree)
+        after = keys_of()
     finally:
         path.write_text(text, encoding="utf-8")
     assert {label for label in RUNS if after[label][0] != before[label][0]} == units
     assert {label for label in RUNS if after[label][1] != before[label][1]} == worlds
 
 
-def test_a_new_file_that_judging_imports_counts(tree, before):
+def test_a_new_file_that_judging_imports_counts(tree, keys_of, before):
     metrics, new = tree / "src/swarmscope/judging/metrics.py", tree / "src/swarmscope/judging/brand_new.py"
     text = metrics.read_text(encoding="utf-8")
     try:
@@ -99,7 +118,7 @@ def test_a_new_file_that_judging_imports_counts(tree, before):
         keys = []
         for words in ("ONE = 1\n", "ONE = 2\n"):
             new.write_text(words)
-            keys.append(keys_in(tree)["nav"][0])
+            keys.append(keys_of()["nav"][0])
     finally:
         metrics.write_text(text, encoding="utf-8")
         new.unlink()
@@ -115,10 +134,10 @@ def make(seed, robots=1, radius=0.15, *, length_m: float = 4.0):
 """
 
 
-def test_the_key_of_a_users_file_is_that_of_its_content_wherever_it_lies(tree, tmp_path):
+def test_the_key_of_a_users_file_is_that_of_its_content_wherever_it_lies(keys_of, tmp_path):
     def key(folder, **options):
         task = {"name": str(tmp_path / folder / "mine.py"), "options": options}
-        return tuple(keys_in(tree, {"mine": {"task": task, "robots": 1}})["mine"])
+        return tuple(keys_of({"mine": {"task": task, "robots": 1}})["mine"])
 
     for folder in ("a", "b"):
         (tmp_path / folder).mkdir()

@@ -12,7 +12,7 @@ import json
 import math
 import traceback
 from collections.abc import Mapping
-from functools import cache, lru_cache
+from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -22,7 +22,7 @@ from swarmscope.closure import closure_of, closure_state, libraries_of, state_of
 from swarmscope.errors import InputFileError, SwarmscopeError
 from swarmscope.judging import references
 from swarmscope.judging.cases import find_cases
-from swarmscope.judging.provenance import git_revision, installed_version, library_version, versions
+from swarmscope.judging.provenance import installed_version, library_version, own_revision, versions
 from swarmscope.judging.references import References
 from swarmscope.judging.run import Outcome, figures, play
 from swarmscope.onboard.planners import planner_file
@@ -85,12 +85,6 @@ def _code_state(planner: str | None, task: str | None, edited: tuple[str, ...]) 
 def code_files(planner: str | None, task: str | None) -> list[Path]:
     """Return the files of a planner and a task, where they are given."""
     return ([planner_file(planner)] if planner else []) + ([task_file(task)] if task else [])
-
-
-@lru_cache(maxsize=1)
-def revision() -> str:
-    """Return the git revision, asked once."""
-    return git_revision()
 
 
 def model_state(config: dict[str, Any]) -> str | None:
@@ -188,7 +182,7 @@ def _run(asked: dict[str, Any]) -> dict[str, Any]:
         "failures": values["failures"],
         "cases": find_cases(outcome.trace.choices, outcome.setting.dt),
     }
-    about = {"git": revision(), "code": code_state(asked["config"])} | versions()
+    about = {"git": own_revision(), "code": code_state(asked["config"])} | versions()
     references = {
         "shortest_m": _list(outcome.references.shortest_m),
         "any_angle_m": _list(outcome.references.any_angle_m),

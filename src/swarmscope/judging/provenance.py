@@ -40,6 +40,13 @@ def git_revision(package: Path = PACKAGE) -> str:
     return f"{revision}-dirty" if changes else revision
 
 
+@cache
+def own_revision() -> str:
+    """Return the revision of this package, asked once: what is loaded does not change any more."""
+    return git_revision()
+
+
+@cache
 def installed_version(package: str) -> str:
     """Return the version of a package, 'unknown' when it is not installed."""
     try:

@@ -21,7 +21,7 @@ from swarmscope.judging.metrics import (
     side_accuracy,
     sides_judged,
 )
-from swarmscope.judging.provenance import git_revision, versions
+from swarmscope.judging.provenance import own_revision, versions
 from swarmscope.judging.references import References, reference_ways
 from swarmscope.judging.run_folder import check_out, write_run
 from swarmscope.judging.sides import judged_by, make_advice
@@ -167,7 +167,7 @@ def figures(outcome: Outcome) -> dict[str, Any]:
         **_model(outcome.setting.planner),
         "config_sha256": hashlib.sha256(json.dumps(complete(scenario), sort_keys=True).encode()).hexdigest(),
         "versions": versions(),
-        "git_revision": git_revision(),
+        "git_revision": own_revision(),
         "plan_us_p50": _percentile(trace.plan_us, 50),
         "plan_us_p99": _percentile(trace.plan_us, 99),
         "measured": {

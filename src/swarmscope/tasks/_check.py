@@ -13,11 +13,13 @@ from swarmscope.sim.contact import static_clearance
 from swarmscope.sim.world import World, compile_world
 from swarmscope.tasks._contract import Setup, check_robots
 from swarmscope.tasks._occupancy import (
+    Raster,
     components,
     domain_of,
     free_cells_near,
     labels_at,
     rasterise,
+    with_circles,
 )
 
 CLEARANCE_M = 0.05  # room beyond the robot's radius that a way must leave
@@ -71,14 +73,34 @@ def unreachable(setup: Setup, reach: Reach) -> Ints:
     One labelling of the free cells serves all robots. A start or goal whose own cell is blocked counts as in
     the free cell nearest to it within the clearance plus two cells.
     """
+    return _apart(_raster_of(setup, reach), setup.starts, setup.goals, reach)
+
+
+def pass_each_other(setup: Setup, reach: Reach) -> bool:
+    """Tell whether every robot has a way when all the others have arrived, which then stand in its way."""
+    raster = _raster_of(setup, reach)
+    parked = np.column_stack([setup.goals, np.full(len(setup.goals), reach.radius)])
+    for i in range(len(parked)):
+        # The world's obstacles are the same for all of them; painting those takes most of the time.
+        seen = with_circles(raster, np.delete(parked, i, axis=0), reach.radius + reach.clearance)
+        if _apart(seen, setup.starts[i : i + 1], setup.goals[i : i + 1], reach).size:
+            return False
+    return True
+
+
+def _raster_of(setup: Setup, reach: Reach) -> Raster:
     domain = domain_of(setup.world, [setup.starts, setup.goals])
     area = (domain[2] - domain[0]) * (domain[3] - domain[1])
     resolution = max(reach.resolution, float(np.sqrt(area / LARGEST_GRID_CELLS)))
-    raster = rasterise(compile_world(setup.world), reach.radius + reach.clearance, domain, resolution)
+    return rasterise(compile_world(setup.world), reach.radius + reach.clearance, domain, resolution)
+
+
+def _apart(raster: Raster, starts: Floats, goals: Floats, reach: Reach) -> Ints:
+    """Return which starts and goals lie in different parts of the free space."""
     found = components(raster)
-    slack = int(np.ceil(reach.clearance / resolution)) + 2
-    start = labels_at(found, free_cells_near(raster, setup.starts, slack))
-    goal = labels_at(found, free_cells_near(raster, setup.goals, slack))
+    slack = int(np.ceil(reach.clearance / raster.resolution)) + 2
+    start = labels_at(found, free_cells_near(raster, starts, slack))
+    goal = labels_at(found, free_cells_near(raster, goals, slack))
     return np.flatnonzero((start != goal) | (start < 0))
 
 

@@ -66,6 +66,14 @@ def rasterise(
     return Raster(blocked, x0, y0, resolution)
 
 
+def with_circles(raster: Raster, circles: Floats, inflate: float) -> Raster:
+    """Return the raster with the cells blocked, too, that are closer than ``inflate`` to circles (N, 3) x, y, radius
+    [m]."""
+    blocked = raster.blocked.copy()
+    _paint_circles(blocked, raster.x0, raster.y0, raster.resolution, circles, inflate)
+    return raster._replace(blocked=blocked)
+
+
 def domain_of(
     spec: WorldSpec, points: Iterable[Floats], margin: float = 2.0
 ) -> tuple[float, float, float, float]:

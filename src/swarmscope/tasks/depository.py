@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from swarmscope.errors import ConfigError, UnsolvableWorldError
 from swarmscope.sim.world import Circle, Obstacle, WorldSpec
-from swarmscope.tasks._check import Reach, check_setup, unreachable
+from swarmscope.tasks._check import Reach, check_setup, pass_each_other
 from swarmscope.tasks._contract import Amount, Density, Length, Option, Setup, check_robots, read_options
 from swarmscope.tasks._forest import MARGIN_M, ROOM_M, smallest_spacing
 from swarmscope.tasks._rocks import draw_rocks
@@ -82,7 +82,7 @@ def make(seed: int, robots: int = 5, radius: float = 0.43, **options: Option) ->
         except _NoRoomError:
             continue
         fits = True
-        if _is_solvable(setup, radius, chosen.spare_m):
+        if pass_each_other(setup, Reach(radius, chosen.spare_m)):
             check_setup(setup, radius)
             return setup
     if not fits:
@@ -91,17 +91,6 @@ def make(seed: int, robots: int = 5, radius: float = 0.43, **options: Option) ->
         f"no solvable depository in {REDRAWS + 1} draws of seed {seed} for robots of radius {radius:g} m; "
         "lower the density or the radius"
     )
-
-
-def _is_solvable(setup: Setup, radius: float, spare: float) -> bool:
-    """Tell whether every robot has a way when all the others have arrived, which then stand in its way."""
-    parked = [Circle(center=(x, y), radius=radius) for x, y in setup.goals.tolist()]
-    for i in range(len(parked)):
-        obstacles = [*setup.world.obstacles, *parked[:i], *parked[i + 1 :]]
-        spec = WorldSpec(obstacles=obstacles, bounds=setup.world.bounds)
-        if unreachable(Setup(spec, setup.starts[i : i + 1], setup.goals[i : i + 1]), Reach(radius, spare)).size:
-            return False
-    return True
 
 
 def draw_room(seed: int, draw: int, robots: int, radius: float, options: DepositoryOptions) -> Setup:
