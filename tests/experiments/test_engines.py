@@ -123,7 +123,10 @@ def test_ctrl_c_says_how_to_go_on(tmp_path):
     # 200 runs are more than end before the signal.
     few = {"places": {"near": VALUES["places"]["near"]}, "planners": {"Nav-SCOPE": VALUES["planners"]["Nav-SCOPE"]}}
     file, path = write_experiment(tmp_path, seeds="1000-1199", sweeps=[], **few), tmp_path / "s.sqlite"
+    # Where the tests run in the background of a shell, Ctrl-C is ignored, and a process would inherit that.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
     process = start("run", file, path)
+    signal.signal(signal.SIGINT, before)
     wait_for(lambda: count(path) >= 2 or process.poll() is not None)
     process.send_signal(signal.SIGINT)
     _, said = process.communicate(timeout=180)
