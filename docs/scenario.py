@@ -65,7 +65,7 @@ FORMULAS = (
         "P_ni (14)",
         "how sure neighbour i's features are: a logistic of its two passable distances less twice the threshold w_n",
         "P_ni (Nav-SCOPE 14",
-        "none; w_n (20) follows from `robot.*`",
+        "none; w_n (20) follows from `robot.*`; recorded in `run.trace.opinions` (`trajectory.npz`)",
     ),
     ("P_dir (15)", "own and neighbours' opinions fused: left from 0.5 upward", "Return P_dir", "`planner.params.w_i`"),
     (

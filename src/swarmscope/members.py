@@ -10,6 +10,7 @@ from __future__ import annotations
 import ast
 import importlib
 import importlib.util
+import inspect
 import re
 from collections.abc import Callable
 from functools import cache
@@ -94,6 +95,13 @@ def load(kind: Kind, name: str) -> ModuleType:
     return module
 
 
+def _shown(value: Any) -> str:
+    """Return a value in a few words: a function as what it is called with."""
+    function = getattr(value, "py_func", value)
+    text = str(inspect.signature(function)) if inspect.isfunction(function) else repr(value)
+    return " ".join(text.split())[:60]
+
+
 def check(module: ModuleType, kind: Kind, file: Path) -> None:
     """Raise an InputFileError if a module lacks something that members of its kind define."""
     for need in kind.needs:
@@ -101,7 +109,7 @@ def check(module: ModuleType, kind: Kind, file: Path) -> None:
             raise InputFileError(file, f"has no {need.name} ({need.what}), which every {kind.word} defines")
         value = getattr(module, need.name)
         if not need.fits(value):
-            shown = " ".join(repr(value).split())[:60]
+            shown = _shown(value)
             raise InputFileError(file, f"{line_of(file, need.name)}{need.name} is {shown}, wanted {need.what}")
 
 

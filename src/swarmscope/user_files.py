@@ -22,6 +22,7 @@ import sys
 import traceback
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from textwrap import shorten
 from types import CodeType, ModuleType
 from typing import Any, TypeVar, cast
 
@@ -160,10 +161,25 @@ def _not_python(error: SyntaxError) -> str:
 
 def raised(error: BaseException, path: Path) -> str:
     """Return what was raised, and in which line of the user's file."""
+    if type(error).__module__.startswith("numba."):
+        return _not_compiled(error, path)
     lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
     place = f" in line {lines[-1]}" if lines else ""
     message = one_line(error)
     return f"raised {type(error).__name__}{place}{': ' if message else ''}{message}"
+
+
+def _not_compiled(error: BaseException, path: Path) -> str:
+    """Return what the compiler says of a user's kernel: its own words without the frames, and the line in the file."""
+    lines = re.findall(rf'File "(?:[^"]*[/\\])?{re.escape(path.name)}", line (\d+)', str(error))
+    place = f" in line {lines[0]}" if lines else ""  # the innermost comes first
+    said = [line.strip() for line in str(error).splitlines() if line.strip() and not _STEP.match(line.strip())]
+    what = shorten(_COLOUR.sub("", said[0] if said else type(error).__name__), 200, placeholder=" ...")
+    return f"does not compile{place}: {what} (without jit it runs as plain Python, slower)"
+
+
+_STEP = re.compile(r"(\x1b\[\d*m)*Failed in \w+ mode pipeline")
+_COLOUR = re.compile(r"\x1b\[\d*m")
 
 
 def one_line(error: BaseException) -> str:

@@ -17,6 +17,7 @@ from swarmscope import Run, api, load_run, load_scenario, simulate
 from swarmscope.cli.main import app
 from swarmscope.errors import ConfigError, InputFileError, MissingPackageError, SwarmscopeError, UnknownNameError
 from swarmscope.judging.run_folder import REQUIRED, RUN_FILES, read_config, read_metrics, read_trajectory, read_world
+from swarmscope.onboard.deciding.fields import fuse
 
 ROOT = Path(__file__).parents[2]
 SHORT = {"robots": 3, "limit_s": 6}
@@ -263,3 +264,19 @@ def test_the_example_compares_three_planners():
 
 def test_version_is_still_there():
     assert swarmscope.__version__.count(".") == 2
+
+
+def test_every_neighbours_opinion_is_kept(tmp_path):
+    """P_dir (15) follows from P_a, each P_ni (14) and each f_ai (12) as they are kept."""
+    run = simulate("T3", robots=8, seed=3, limit_s=40.0, record_scans="no", progress=False)
+    choices, opinions = run.trace.choices, run.trace.opinions
+    assert len(choices) > 3 and len(opinions) > 3
+    assert opinions[:, 0].max() < len(choices)
+    for k, (_, robot, p_self, p_left, side, heard) in enumerate(choices):
+        own = opinions[opinions[:, 0] == k]
+        assert len(own) == heard and robot not in own[:, 1]
+        assert set(np.unique(own[:, 2])) <= {-1.0, 1.0} and side in (-1.0, 1.0)
+        p_ni, f_ai = own[:, 3], own[:, 4]
+        assert p_left == pytest.approx(fuse(p_self, float((f_ai * p_ni).sum()), float(f_ai.sum())))
+    again = load_run(run.save(tmp_path / "run", pictures=False))
+    assert (again.trace.choices == choices).all() and (again.trace.opinions == opinions).all()

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 import swarmscope as package
 from swarmscope.cli.main import app
-from swarmscope.cli.perceive import SCAN_FOLDER
+from swarmscope.sim.scan_files import SCAN_FOLDER
 
 SCANS = "malaga_telecom_2006_sick_lms"
 COMMANDS = ("run", "perceive", "replay", "planners", "tasks")

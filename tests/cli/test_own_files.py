@@ -11,7 +11,8 @@ import pytest
 import yaml
 from command_line import refused, swarmscope
 
-from swarmscope import load_run
+from swarmscope import Body, Lidar, Robot, load_run
+from swarmscope.errors import InputFileError
 from swarmscope.judging.run_folder import RUN_FILES, read_config, read_metrics
 
 SHORT = ["--robots", 2, "--limit", 1, "--set", "lidar.beams=60"]
@@ -151,3 +152,27 @@ def test_an_experiment_with_a_file_is_reported_without_running_it(here):
 def test_the_command_lists_tasks_with_their_options():
     assert "density=0.35" in swarmscope("tasks").stdout
     assert Path("ring.py").name not in swarmscope("tasks").stdout
+
+
+HEAD = "from swarmscope.kit import jit\nNAME = SUMMARY = NEEDS = 'x'\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("def decide(see, memory, params):\n    1 / 0", "raised ZeroDivisionError in line 4"),
+        ("def decide(see, memory, params):\n    see.percept['goal']", "in line 4: no field of name goal"),
+        ("def decide(see, memory, params): see.out['state'] = 77", "decide set state 77, there are 0 to "),
+        ("def decide(see, memory, params): see.out['reason'] = 99", "decide set reason 99, there are 0 to "),
+        ("def decide(see, memory): pass", "line 3: decide is (see, memory), wanted a function (see, memory, params)"),
+        ("@jit\ndef decide(see, memory, params):\n    see.percept['goal']", "does not compile in line 5: Field 'goal'"),
+    ],
+)
+def test_what_is_wrong_with_a_decision_is_said_in_a_line(tmp_path, monkeypatch, text, said):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.py").write_text(HEAD + text + "\n")
+    message = refusal("run", "--task", "T1", "--planner", "mine.py", *SHORT, "--out", "r", "--no-pictures")
+    assert "mine.py: " in message and said in message
+    assert len(message) < 400
+    with pytest.raises(InputFileError, match="mine"):
+        Robot("mine.py", Body(), Lidar(60), address=1).warm_up()

@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 
 from helpers import circles_world, one_robot, rig_of, scan_at
-from swarmscope.cli.perceive import SCAN_FOLDER
 from swarmscope.errors import ConfigError, InputFileError
 from swarmscope.experiments.perceive import perceive, write_features
 from swarmscope.onboard.perception.safety import safe_directions
 from swarmscope.onboard.rig import AHEAD
 from swarmscope.onboard.tick import own_features
-from swarmscope.sim.scan_files import ScanLog, load_scans
+from swarmscope.sim.scan_files import SCAN_FOLDER, ScanLog, load_scans
 from swarmscope.viewing.perceive_picture import PANELS, write_perceive_picture
 
 

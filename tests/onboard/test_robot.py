@@ -5,6 +5,7 @@ from __future__ import annotations
 import array
 import gc
 import math
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -452,3 +453,12 @@ def test_the_example_runs():
     assert any(line.endswith("chose a side with the neighbours' features") for line in lines)
     assert lines[-1].startswith("both arrived after ")
     assert lines[-1].endswith("faults: {3: {}, 7: {}}")
+
+
+def test_a_robot_in_the_place_of_a_recording_says_why_it_does_what():
+    example = Path(__file__).resolve().parents[2] / "examples" / "recording.py"
+    done = subprocess.run([sys.executable, str(example)], capture_output=True, text=True, check=True, timeout=600)
+    ticks = {words: int(count) for count, words in re.findall(r"(\d+) ticks  (.*)", done.stdout)}
+    assert sum(ticks.values()) == 225 and len(ticks) > 3
+    assert ticks["arrived: arrived at the goal"] == 1
+    assert not any(words.startswith("brakes") for words in ticks)

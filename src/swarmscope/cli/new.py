@@ -158,7 +158,7 @@ def new_command(kind: str, name: str) -> None:
     for file, text in zip(files, TEXTS[kind], strict=True):
         _write(file, Template(text).substitute(name=name, label=name.replace("_", "-")))
         print(file)
-    print(f"Try it: swarmscope run --{kind} {files[0]}   pytest {files[1]}")
+    print(f"Try it: swarmscope run --{kind} {files[0]}   python -m pytest {files[1]}  (pip install pytest)")
 
 
 def _write(file: Path, text: str) -> None:

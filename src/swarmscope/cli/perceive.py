@@ -8,11 +8,8 @@ import numpy as np
 from rich.table import Table
 
 from swarmscope.cli._console import PlainConsole
-from swarmscope.errors import UnknownNameError
 from swarmscope.experiments.perceive import Perception, perceive, write_features
-from swarmscope.sim.scan_files import ScanLog, load_scans
-
-SCAN_FOLDER = Path(__file__).parent.parent / "data" / "scans"
+from swarmscope.sim.scan_files import ScanLog, load_scans, scan_file
 
 
 def perceive_command(scans: str, out: Path | None, range_m: float, radius_m: float, beam_step: int = 1) -> None:
@@ -23,17 +20,6 @@ def perceive_command(scans: str, out: Path | None, range_m: float, radius_m: flo
     if out is not None:
         for path in write_results(out, seen, log.name):
             print(path)
-
-
-def scan_file(name: str) -> Path:
-    """Return the scan file called ``name``: a path, or scans that come with the package."""
-    path = Path(name)
-    if path.suffix or len(path.parts) > 1:
-        return path
-    packaged = {file.stem: file for file in SCAN_FOLDER.glob("*.npz")}
-    if name not in packaged:
-        raise UnknownNameError("scans", name, packaged)
-    return packaged[name]
 
 
 def write_results(out: Path, seen: Perception, title: str) -> tuple[Path, Path]:

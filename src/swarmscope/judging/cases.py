@@ -26,6 +26,23 @@ def find_cases(choices: np.ndarray, dt: float) -> list[dict[str, Any]]:
     return [case for kind in kinds for case in [c for c in cases if c["kind"] == kind][:MOST_CASES]]
 
 
+CHOICE_COLUMNS = ("tick", "robot", "p_self", "p_left", "side", "heard")
+"""Of a choice: when and whose, P_a (9), P_dir (15), +1 left or -1 right, how many neighbours took part."""
+OPINION_COLUMNS = ("choice", "heard_id", "heard_side", "heard_p", "heard_f")
+"""Of a neighbour's part in one: which row of the choices, whose, on which side it is, its P_ni (14) and f_ai (12)."""
+
+
+def choices_table(choices: np.ndarray) -> np.ndarray:
+    """Return the ``CHOICE_COLUMNS`` of rows of ``CHOICE``, (C, 6) float64."""
+    return np.column_stack([choices[name].astype(np.float64) for name in CHOICE_COLUMNS])
+
+
+def opinions_table(choices: np.ndarray) -> np.ndarray:
+    """Return the ``OPINION_COLUMNS`` of every neighbour that took part in one of the ``choices``, (O, 5) float64."""
+    choice, k = np.nonzero(np.arange(choices["heard_id"].shape[1]) < choices["heard"][:, None])
+    return np.column_stack([choice.astype(np.float64), *(choices[name][choice, k] for name in OPINION_COLUMNS[1:])])
+
+
 def _case(row: np.void, dt: float) -> dict[str, Any]:
     count, side = int(row["heard"]), int(row["side"])
     neighbours = [

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from swarmscope.judging.cases import choices_table, opinions_table
 from swarmscope.judging.metrics import (
     all_metrics,
     mover_arrival_rate,
@@ -239,6 +240,8 @@ def trajectory(outcome: Outcome) -> dict[str, np.ndarray]:
         "scan_u8": records.scan,
         "safe_bits": records.safe,
         "links": trace.links,
+        "choices": choices_table(trace.choices),
+        "opinions": opinions_table(trace.choices),
         "arrival_s": trace.robots["arrival_s"].copy(),
         "collided": trace.robots["crashed"].copy(),
         "range_max_m": np.array(rig.sensor.range_max),

@@ -15,6 +15,7 @@ runs once a tick for each robot between perception and guard (``tick.py``). It m
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
@@ -28,9 +29,10 @@ from swarmscope.bounds import Field, converted, fields_of
 from swarmscope.errors import ConfigError, InputFileError
 from swarmscope.members import Kind, Need, check, find, is_text, load, names_of, text
 from swarmscope.onboard.loops import Step, batch_step, compiled_step, is_compiled, plain_step
-from swarmscope.onboard.reasons import REASON_NAMES
+from swarmscope.onboard.reasons import REASON_NAMES, STATE_NAMES
 from swarmscope.onboard.tick import guard_all, perceive_all
 from swarmscope.onboard.view import Swarm
+from swarmscope.user_files import guarded
 
 STILL_S = 0.6
 """A neighbour that has not moved for so long [s] is an obstacle, for planners without a parameter ``still_s``."""
@@ -124,8 +126,28 @@ class Planner:
         return plain_step(self.module.decide)
 
     def step_all(self, first: int, last: int, swarm: Swarm, memories: np.ndarray, params: Any) -> None:
-        """Run one tick of robots ``first`` to ``last - 1``, from scan to command; for none it loads the kernels."""
-        self._step(first, last, swarm, memories, params, float(getattr(params, "still_s", STILL_S)))
+        """Run one tick of robots ``first`` to ``last - 1``, from scan to command; for none it loads the kernels.
+
+        What is wrong with a planner from outside raises InputFileError with its file and line.
+        """
+        still_s = float(getattr(params, "still_s", STILL_S))
+        if not self._from_outside:
+            self._step(first, last, swarm, memories, params, still_s)
+            return
+        guarded(lambda: self._step(first, last, swarm, memories, params, still_s), Path(str(self.module.__file__)))
+        self._check_words(swarm.decisions[first:last])
+
+    @property
+    def _from_outside(self) -> bool:
+        """Whether its file is not one of this package."""
+        return not self.module.__name__.startswith("swarmscope.")
+
+    def _check_words(self, decisions: np.ndarray) -> None:
+        """Raise InputFileError when a decision has a state or a reason for which there are no words."""
+        for what, names in (("state", STATE_NAMES), ("reason", self.reasons)):
+            if (decisions[what] >= len(names)).any():
+                why = f"decide set {what} {decisions[what].max()}, there are 0 to {len(names) - 1}"
+                raise InputFileError(str(self.module.__file__), why)
 
     @property
     def kernels(self) -> tuple[Any, ...]:
@@ -176,6 +198,21 @@ def _is_dtype(value: Any) -> bool:
     return isinstance(value, np.dtype) and value.names is not None
 
 
+def _takes(value: Any, count: int) -> bool:
+    """Tell whether this can be called with so many arguments; the planner's network may be one more."""
+    try:
+        signature = inspect.signature(getattr(value, "py_func", value))
+    except (TypeError, ValueError):
+        return False
+    for extra in ([], [None]):
+        try:
+            signature.bind(*[None] * count, *extra)
+            return True
+        except TypeError:
+            continue
+    return False
+
+
 def _is_params(value: Any) -> bool:
     return isinstance(value, type) and issubclass(value, tuple) and hasattr(value, "_field_defaults")
 
@@ -189,8 +226,8 @@ KIND = Kind(
 OPTIONAL = (
     Need("Params", "a NamedTuple with defaults", _is_params),
     Need("MEMORY", "a numpy dtype with fields", _is_dtype),
-    Need("decide", "a function (see, memory, params)", callable),
-    Need("decide_all", "a function (first, last, swarm, memories, params)", callable),
+    Need("decide", "a function (see, memory, params)", lambda v: _takes(v, 3)),
+    Need("decide_all", "a function (first, last, swarm, memories, params)", lambda v: _takes(v, 5)),
     Need("new_memory", "a function (robots)", callable),
     Need("REASONS", "a tuple of texts", lambda v: isinstance(v, tuple) and all(map(is_text, v))),
 )

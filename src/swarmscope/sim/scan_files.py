@@ -24,10 +24,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from swarmscope.errors import InputFileError, nearest_hint
+from swarmscope.errors import InputFileError, UnknownNameError, nearest_hint
 
 MAX_BYTES = 1 << 30
 NO_RETURN_CM = 65535
+SCAN_FOLDER = Path(__file__).parent.parent / "data" / "scans"
 HEADER_KEYS = ("angle_min", "angle_increment", "range_min", "range_max")
 
 
@@ -46,6 +47,17 @@ class ScanLog:
     range_max: float
     odom: npt.NDArray[np.float64] | None
     """(K, 3) x [m], y [m], yaw [rad] by odometry, or None."""
+
+
+def scan_file(name: str) -> Path:
+    """Return the scan file called ``name``: a path, or scans that come with the package."""
+    path = Path(name)
+    if path.suffix or len(path.parts) > 1:
+        return path
+    packaged = {file.stem: file for file in SCAN_FOLDER.glob("*.npz")}
+    if name not in packaged:
+        raise UnknownNameError("scans", name, packaged)
+    return packaged[name]
 
 
 def load_scans(path: str | Path) -> ScanLog:
