@@ -134,8 +134,13 @@ class Planner:
         if not self._from_outside:
             self._step(first, last, swarm, memories, params, still_s)
             return
-        guarded(lambda: self._step(first, last, swarm, memories, params, still_s), Path(str(self.module.__file__)))
+        guarded(lambda: self._step(first, last, swarm, memories, params, still_s), self._place)
         self._check_words(swarm.decisions[first:last])
+
+    @property
+    def _place(self) -> Path:
+        """Its file, or the name of a module that has none."""
+        return Path(getattr(self.module, "__file__", None) or self.module.__name__)
 
     @property
     def _from_outside(self) -> bool:
@@ -147,7 +152,7 @@ class Planner:
         for what, names in (("state", STATE_NAMES), ("reason", self.reasons)):
             if (decisions[what] >= len(names)).any():
                 why = f"decide set {what} {decisions[what].max()}, there are 0 to {len(names) - 1}"
-                raise InputFileError(str(self.module.__file__), why)
+                raise InputFileError(self._place, why)
 
     @property
     def kernels(self) -> tuple[Any, ...]:
