@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from rich.progress import track
 
-from swarmscope.judging.provenance import git_revision, versions
+from swarmscope.judging.provenance import own_revision, versions
 from swarmscope.judging.run import figures, play
 from swarmscope.judging.statistics import bootstrap_mean, paired_difference, wilson
 from swarmscope.scenarios.overrides import set_key
@@ -159,7 +159,7 @@ def main() -> None:
             summarise(task, theirs)
             compare(task, mine, theirs, options.against)
     if options.out:
-        about = {"changes": changes, "seeds": options.seeds, "versions": versions(), "git": git_revision()}
+        about = {"changes": changes, "seeds": options.seeds, "versions": versions(), "git": own_revision()}
         table = {"about": about, "runs": rows, "against": {"change": options.against, "runs": others}}
         options.out.write_text(json.dumps(table, indent=1) + "\n")
 

@@ -1,6 +1,6 @@
 """One robot in the place of the one that recorded scans: what it would have done in every tick, and why.
 
-python examples/recording.py [SCANS.npz]   (without a file: the packaged ones of a SICK LMS on a wheelchair)
+python examples/recording.py [SCANS.npz | SCANS.csv]   (without a file: the packaged ones of a SICK LMS on a wheelchair)
 """
 
 from __future__ import annotations
@@ -18,7 +18,9 @@ log = load_scans(scan_file(sys.argv[1] if len(sys.argv) > 1 else "malaga_telecom
 scans, beams = log.ranges_m.shape
 poses = np.zeros((scans, 3)) if log.odom is None else log.odom
 stamps = log.stamp_s if np.isfinite(log.stamp_s).all() else 0.25 * np.arange(scans)
-lidar = Lidar(beams, range_m=5.0, fov_deg=math.degrees(log.increment * (beams - 1)))
+end = poses[-1] if log.odom is not None else np.array([10.0, 0.0, 0.0])  # the goal: where the recording ends
+field_deg, first_deg = math.degrees(log.increment * (beams - 1)), math.degrees(log.angle_min)
+lidar = Lidar(beams, range_m=min(5.0, log.range_max), fov_deg=field_deg, first_deg=first_deg)
 
 robot = Robot("nav-scope", Body(radius_m=0.25, half_width_m=0.25, v_max_mps=1.5), lidar, address=7, rate_hz=4.0)
 robot.warm_up(print)
@@ -28,7 +30,7 @@ for scan, pose, now_s in zip(log.ranges_m, poses, stamps, strict=True):
     ahead, across, turn = pose - before
     c, s = math.cos(before[2]), math.sin(before[2])
     moved = (c * ahead + s * across, c * across - s * ahead, turn)
-    left = poses[-1] - pose  # the goal: where the recording ends
+    left = end - pose
     goal = (math.atan2(left[1], left[0]) - pose[2], math.hypot(left[0], left[1]))
     speed = moved[0] / (now_s - before_s)
     command = robot.tick(scan=scan, scan_s=now_s, now_s=now_s, goal=goal, heading=pose[2], speed=speed, moved=moved)

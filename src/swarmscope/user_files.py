@@ -30,6 +30,8 @@ from swarmscope.closure import NAME, OF_A_USER, closure_state
 from swarmscope.errors import InputFileError, SwarmscopeError
 
 Result = TypeVar("Result")
+COLOUR = re.compile(r"\x1b\[\d*m")
+"""What makes words of the compiler coloured on a terminal."""
 RAISED = (Exception, SystemExit, GeneratorExit)
 """What a user's code can raise and should not end the program with."""
 
@@ -171,15 +173,12 @@ def raised(error: BaseException, path: Path) -> str:
 
 def _not_compiled(error: BaseException, path: Path) -> str:
     """Return what the compiler says of a user's kernel: its own words without the frames, and the line in the file."""
-    lines = re.findall(rf'File "(?:[^"]*[/\\])?{re.escape(path.name)}", line (\d+)', str(error))
+    text = COLOUR.sub("", str(error))
+    lines = re.findall(rf'File "(?:[^"]*[/\\])?{re.escape(path.name)}", line (\d+)', text)
     place = f" in line {lines[0]}" if lines else ""  # the innermost comes first
-    said = [line.strip() for line in str(error).splitlines() if line.strip() and not _STEP.match(line.strip())]
-    what = shorten(_COLOUR.sub("", said[0] if said else type(error).__name__), 200, placeholder=" ...")
+    said = [line.strip() for line in text.splitlines() if line.strip() and not line.startswith("Failed in ")]
+    what = shorten(said[0] if said else type(error).__name__, 200, placeholder=" ...")
     return f"does not compile{place}: {what} (without jit it runs as plain Python, slower)"
-
-
-_STEP = re.compile(r"(\x1b\[\d*m)*Failed in \w+ mode pipeline")
-_COLOUR = re.compile(r"\x1b\[\d*m")
 
 
 def one_line(error: BaseException) -> str:

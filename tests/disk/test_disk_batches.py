@@ -31,7 +31,7 @@ def test_an_error_in_one_process_stops_the_others(tmp_path):
         play_all(Choice(str(mine)), two_runs(), 2)
     # Asked again and again: a thread of the pool waits for the same processes, and where it was told of an end and has
     # not noted it yet, they still count as alive for a moment.
-    end = time.monotonic() + 60
+    end = time.monotonic() + 10
     while left := set(multiprocessing.active_children()) - set(before):
         assert time.monotonic() < end, left
         time.sleep(0.02)

@@ -111,7 +111,7 @@ def test_kill_9_of_everything_loses_only_what_was_under_way(tmp_path, truth):
     process.communicate()
     kept = count(path)
     assert 5 <= kept < RUNS
-    wait_for(lambda: not any(os.path.exists(f"/proc/{w}") for w in workers), 60.0)  # nobody outlives the driver
+    wait_for(lambda: not any(os.path.exists(f"/proc/{w}") for w in workers), 20.0)  # nobody outlives the driver
     resumed = start("resume", file, path, *HERE)
     _, said = resumed.communicate(timeout=180)
     assert resumed.returncode == 0, said
@@ -157,7 +157,7 @@ def test_a_run_that_fails_is_named_and_can_be_tried_again(tmp_path):
 
 
 def test_a_job_that_kills_every_worker_is_given_up(monkeypatch):
-    assert _retry.MOST_TRIES >= 2
+    assert _retry.MOST_TRIES == 5
     monkeypatch.setattr(_retry, "MOST_TRIES", 2)  # each takes the start of a process
     bad = json.dumps({"key": "bad", "world": "w", "config": {"deadly": True}})
     good = one_job()

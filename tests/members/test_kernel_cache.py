@@ -62,6 +62,7 @@ def test_editing_a_file_compiles_what_imports_it_and_nothing_else(tmp_path):
     (tmp_path / "one.py").write_text(KERNEL.format("from shared import shared", "10.0 * shared(x)"))
     (tmp_path / "two.py").write_text(KERNEL.format("", "3.0 * x"))
     assert run(tmp_path) == ({"one": 30.0, "two": 6.0}, set())
+    assert run(tmp_path) == ({"one": 30.0, "two": 6.0}, {"one", "two"})
     (tmp_path / "two.py").write_text(KERNEL.format("", "4.0 * x"))
     assert run(tmp_path) == ({"one": 30.0, "two": 8.0}, {"one"})
     (tmp_path / "shared.py").write_text(KERNEL.format("", "x + 2.0").replace("kernel", "shared"))

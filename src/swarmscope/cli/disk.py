@@ -30,7 +30,7 @@ from swarmscope.disk.study.batches import Choice, Report, play_all, play_batch, 
 from swarmscope.disk.study.figures import Played, Row, csv_text, ended_words, failures, played, row, rows_by_map
 from swarmscope.errors import ConfigError
 from swarmscope.experiments.seeds import seed_set
-from swarmscope.judging.provenance import git_revision, versions
+from swarmscope.judging.provenance import own_revision, versions
 from swarmscope.scenarios.keys import docs_of
 from swarmscope.viewing.report.publish import put_in_place
 
@@ -294,13 +294,13 @@ class Results:
 
     def save(self, groups: Sequence[Sequence[Played]], more: dict[str, bytes] | None = None) -> None:
         """Write page, runs and figures of what is done so far."""
-        facts = [("version", versions()["swarmscope"]), ("revision", git_revision())]
+        facts = [("version", versions()["swarmscope"]), ("revision", own_revision())]
         all_played = [one for group in groups for one in group]
         about = {
             "command": self.command,
             "rules": [group[0].problem.rules.as_dict() for group in groups],
             "versions": versions(),
-            "git": git_revision(),
+            "git": own_revision(),
             "figures": [row(one, "all")._asdict() | {"robots": one.problem.rules.n} for one in all_played],
         }
         contents = (more or {}) | {

@@ -20,7 +20,7 @@ import numpy as np
 
 from swarmscope.errors import ConfigError, SwarmscopeError
 from swarmscope.experiments.engines.local import start_worker
-from swarmscope.judging.provenance import git_revision, versions
+from swarmscope.judging.provenance import own_revision, versions
 from swarmscope.learning.records import (
     FORMAT,
     MANIFEST,
@@ -124,7 +124,7 @@ def _open(folder: Path) -> dict[str, Any]:
         why = "is not empty and has no manifest" if folder.is_dir() else "is no folder"
         raise ConfigError(str(folder), f"{why}; name another folder")
     schema = {name: f"{kind}, {dimensions} dimension(s)" for name, (kind, dimensions) in SCHEMA.items()}
-    about = {"format": FORMAT, "version": VERSION, "schema": schema, "versions": versions(), "git": git_revision()}
+    about = {"format": FORMAT, "version": VERSION, "schema": schema, "versions": versions(), "git": own_revision()}
     return about | {"sets": {}}
 
 
@@ -166,7 +166,7 @@ def _fill(folder: Path, manifest: dict[str, Any], source: _Shards, samples: int,
         data, about = source.next(maps, (samples - total) / of_a_map)
         file = f"{name}/shard-{len(shards):05d}.npz"
         write_atomically(folder / file, data)
-        shards.append({"file": file, "sha256": hashlib.sha256(data).hexdigest(), "git": git_revision(), **about})
+        shards.append({"file": file, "sha256": hashlib.sha256(data).hexdigest(), "git": own_revision(), **about})
         write_manifest(folder, manifest)
         total += about["samples"]
         maps += about["maps"]

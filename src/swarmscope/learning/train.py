@@ -23,7 +23,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from swarmscope.errors import ConfigError, InputFileError, SwarmscopeError
-from swarmscope.judging.provenance import git_revision, versions
+from swarmscope.judging.provenance import own_revision, versions
 from swarmscope.learning import checkpoints
 from swarmscope.learning.batches import Batch, View, batches
 from swarmscope.learning.config import TrainingConfig
@@ -93,7 +93,7 @@ def train(
     optimizer = torch.optim.AdamW(model.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay)
     training, validation = read_splits(config, data)
     about: dict[str, Any] = {
-        "config": config.model_dump(mode="json"), "versions": all_versions(), "git": git_revision(),
+        "config": config.model_dump(mode="json"), "versions": all_versions(), "git": own_revision(),
         "init": None if init is None else checkpoints.sha256_of(init),
         "data": content_key(read_manifest(data), config.sets),
     }  # fmt: skip

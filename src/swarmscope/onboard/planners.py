@@ -204,18 +204,12 @@ def _is_dtype(value: Any) -> bool:
 
 
 def _takes(value: Any, count: int) -> bool:
-    """Tell whether this can be called with so many arguments; the planner's network may be one more."""
+    """Tell whether this can be called with so many arguments."""
     try:
-        signature = inspect.signature(getattr(value, "py_func", value))
+        inspect.signature(getattr(value, "py_func", value)).bind(*[None] * count)
     except (TypeError, ValueError):
         return False
-    for extra in ([], [None]):
-        try:
-            signature.bind(*[None] * count, *extra)
-            return True
-        except TypeError:
-            continue
-    return False
+    return True
 
 
 def _is_params(value: Any) -> bool:
@@ -232,7 +226,7 @@ OPTIONAL = (
     Need("Params", "a NamedTuple with defaults", _is_params),
     Need("MEMORY", "a numpy dtype with fields", _is_dtype),
     Need("decide", "a function (see, memory, params)", lambda v: _takes(v, 3)),
-    Need("decide_all", "a function (first, last, swarm, memories, params)", lambda v: _takes(v, 5)),
+    Need("decide_all", "a function (first, last, swarm, memories, params)", lambda v: _takes(v, 5) or _takes(v, 6)),
     Need("new_memory", "a function (robots)", callable),
     Need("REASONS", "a tuple of texts", lambda v: isinstance(v, tuple) and all(map(is_text, v))),
 )

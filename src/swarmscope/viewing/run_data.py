@@ -14,6 +14,7 @@ import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from swarmscope.errors import InputFileError
+from swarmscope.judging.cases import CHOICE_COLUMNS, OPINION_COLUMNS
 from swarmscope.judging.run_folder import TRAJECTORY, WORLD, read_metrics, read_trajectory, read_world
 from swarmscope.sim.world import Length, Number, Obstacle, Point
 
@@ -79,10 +80,10 @@ class Trajectory(NamedTuple):
     """(N,)"""
     range_max_m: Array
     """Scalar."""
-    choices: Array = np.empty((0, 6))
-    """(C, 6) tick, robot, P_a, P_dir, side, neighbours heard of each choice of a side; earlier runs have none."""
-    opinions: Array = np.empty((0, 5))
-    """(O, 5) row of the choice, neighbour, its side, its P_ni, its f_ai."""
+    choices: Array = np.empty((0, len(CHOICE_COLUMNS)))
+    """(C, 6) ``CHOICE_COLUMNS`` of each choice of a side; runs of earlier versions have none."""
+    opinions: Array = np.empty((0, len(OPINION_COLUMNS)))
+    """(O, 5) ``OPINION_COLUMNS`` of each neighbour that took part in one."""
 
 
 @dataclass(frozen=True)
@@ -166,7 +167,7 @@ def _checked_world(path: Path, content: Mapping[str, Any]) -> WorldFile:
 
 
 def _checked_trajectory(path: Path, arrays: Mapping[str, Array], robots: int) -> Trajectory:
-    missing = [name for name in Trajectory._fields if name not in {**arrays, **Trajectory._field_defaults}]
+    missing = [name for name in Trajectory._fields if name not in arrays and name not in Trajectory._field_defaults]
     if missing:
         raise InputFileError(path, f"lacks {', '.join(missing)}")
     trajectory = Trajectory(**{name: arrays[name] for name in Trajectory._fields if name in arrays})
@@ -188,9 +189,9 @@ def _shape_fault(trajectory: Trajectory, robots: int) -> str:
     ticks, beams = trajectory.t_s.size, trajectory.beam_angles.size
     wanted: dict[str, tuple[int, ...]] = dict.fromkeys(_PER_TICK, (ticks, robots))
     wanted |= {"t_s": (ticks,), "beam_angles": (beams,), "arrival_s": (robots,), "collided": (robots,)}
-    wanted |= {"range_max_m": ()}
-    for name, width in (("links", 4), ("choices", 6), ("opinions", 5)):
-        wanted[name] = (getattr(trajectory, name).shape[0] if getattr(trajectory, name).ndim else 0, width)
+    wanted["range_max_m"] = ()
+    for name, width in (("links", 4), ("choices", len(CHOICE_COLUMNS)), ("opinions", len(OPINION_COLUMNS))):
+        wanted[name] = (*(getattr(trajectory, name).shape[:1] or (0,)), width)
     for name, width in (("scan_u8", beams), ("safe_bits", (beams + 7) // 8)):
         array: Array = getattr(trajectory, name)
         if array.ndim == 0 or array.shape[0] > 0:

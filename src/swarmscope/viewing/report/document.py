@@ -9,7 +9,7 @@ import yaml
 
 from swarmscope.errors import SwarmscopeError
 from swarmscope.experiments.experiment import Experiment, shipped_experiments
-from swarmscope.judging.provenance import git_revision, versions
+from swarmscope.judging.provenance import own_revision, versions
 from swarmscope.viewing.report import figures, tables, words
 from swarmscope.viewing.report.again import Again
 from swarmscope.viewing.report.blocks import (
@@ -96,7 +96,7 @@ def _facts(material: Material) -> Facts:
             ("Robots per run", words.spans(robots)),
             ("Did not arrive", words.grouped(lost)),
             ("Collisions", words.grouped(tables.total(main, "collisions"))),
-            ("Report made with", f"{installed}, revision {git_revision()}"),
+            ("Report made with", f"{installed}, revision {own_revision()}"),
         ]
     )
 
