@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from swarmscope.onboard.body import Body, Protection, protection_model
+from swarmscope.onboard.control.horizon import Horizon, horizon_of
 from swarmscope.onboard.perception.filters import feature_filter, window_half
 from swarmscope.onboard.perception.safety import Rule, reach_table
 from swarmscope.onboard.sensor import Sensor
@@ -28,6 +29,12 @@ class Guarding(NamedTuple):
     """How long an unseen neighbour is remembered."""
     latency_s: float = 0.0
     """Age of a scan when its command takes effect."""
+    thinnest_m: float = 0.02
+    """Width of the narrowest thing that must not be missed between two beams."""
+    others_mps: float = -1.0
+    """How fast others may be; below 0: as fast as this robot; 0: nothing else moves."""
+    others_yield: bool = True
+    """Whether others run the same guard."""
 
 
 class Safety(NamedTuple):
@@ -64,6 +71,7 @@ class Rig(NamedTuple):
     """alpha/2 in beams."""
     footprint: float
     """Radius that is swept: the body's plus a clearance [m]."""
+    horizon: Horizon
     guarding: Guarding
     sharing: Sharing
     look_ahead: float
@@ -97,7 +105,8 @@ def make_rig(
         sensor=sensor,
         half=half,
         footprint=footprint,
-        guarding=Guarding(*(float(v) for v in guarding)),
+        horizon=horizon_of(body, sensor, guarding.thinnest_m),
+        guarding=_resolved(guarding, body),
         sharing=Sharing(bool(sharing.exact_features), float(sharing.max_age_s)),
         look_ahead=float(safety.look_ahead_m),
         reach=reach,
@@ -105,6 +114,13 @@ def make_rig(
         sin=np.sin(angles),
         taps=feature_filter(half),
     )
+
+
+def _resolved(guarding: Guarding, body: Body) -> Guarding:
+    """Return plain numbers, the speed of others filled in."""
+    others = guarding.others_mps if guarding.others_mps >= 0.0 else body.v_max_mps
+    *lengths, _, _ = guarding
+    return Guarding(*(float(v) for v in lengths), float(others), bool(guarding.others_yield))
 
 
 def _rules(body: Body, protection: Protection, safety: Safety) -> tuple[Rule, ...]:

@@ -9,6 +9,7 @@ from swarmscope._jit import jit, jit_paste
 from swarmscope.onboard.control.guard import guard
 from swarmscope.onboard.perception.features import align_features, extrema
 from swarmscope.onboard.perception.filters import filter_padded, prepare_scan
+from swarmscope.onboard.perception.mend import mend
 from swarmscope.onboard.perception.safety import safe_directions
 from swarmscope.onboard.rig import AHEAD, PRINTED
 from swarmscope.onboard.sharing.inbox import answer_all, read_inbox
@@ -27,6 +28,7 @@ def perceive(see: View, still_s: float) -> None:
     dx, dy = update_odometry(see.percept, see.shared)
     read_inbox(see)
     update_tracks(see.percept, see.shared, see.rig, dx, dy)
+    mend(see.scan, see.rig)
     mask_moving_neighbours(see, still_s)
     safe_directions(see.masked, see.rig.sensor, see.rig.reach[AHEAD], see.edges, see.safe)
 
