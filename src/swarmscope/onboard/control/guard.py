@@ -2,9 +2,9 @@
 
 A command is let through only if the robot, having executed it until the next tick (plus the age of its scan), can still
 brake to a stop within what it has seen to be free, its disc no closer to a return than the clearance (GIWT 1-2; the
-braking distance is Nav-SCOPE's s_b). What lies behind a return, between two beams or beyond the range has not been seen.
-Other robots move: each may use only its half of the gap between two robots, and keeps its braking distance twice, so
-that after both have moved each can still stop in its half. docs/safety.md has the argument. If nothing passes, the robot
+braking distance is Nav-SCOPE's s_b). What lies behind a return, between two beams or beyond the range is not seen.
+Other robots move: each may use only its half of the gap between two, and keeps its braking distance twice, so that
+after both have moved each can still stop in its half. docs/safety.md has the argument. If nothing passes, the robot
 brakes straight on, which the previous tick has shown to be free.
 """
 
@@ -71,7 +71,7 @@ def guard(see: View) -> bool:
         v = wanted * fraction
         if _passes(see, v, w, count, need):
             see.out["v"], see.out["w"] = v, w
-            return v < asked
+            return bool(v < asked)
     see.out["v"], see.out["w"] = 0.0, 0.0 if speed > 1e-6 else w
     return True
 
@@ -178,7 +178,7 @@ def _closer(px: float, py: float, way: Way, need: float) -> bool:
 def _shadowed(px: float, py: float, ux: float, uy: float, way: Way, need: float) -> bool:
     """Tell whether a way that turns comes closer than ``need`` [m] to what the return at (px, py) hides.
 
-    That is the ray from there on along unit direction u. A straight way cannot: all of it lies this side of its returns.
+    That is the ray from there on along unit direction u. All of a straight way lies this side of its returns.
     """
     off4 = _off_ray(way.x4 - px, way.y4 - py, ux, uy)
     off5 = _off_ray(way.x5 - px, way.y5 - py, ux, uy)
@@ -282,8 +282,7 @@ def _clear_of_tracks(see: View, way: Way, met: float) -> bool:
         if d < 1e-6:
             return False
         surface = d - rig.body.radius_m - rig.sensor.position_sigma * d
-        if surface < 1e-6:
-            surface = 1e-6
+        surface = max(surface, 1e-6)
         scale = surface / d
         if not _in_own_half(x * scale, y * scale, surface, way, met, rig):
             return False

@@ -41,8 +41,8 @@ def speed_within(way: float, delay: float, per_v2: float) -> float:
 def horizon_speed(free_things: float, free_robots: float, delay: float, a_max: float, stranger: float) -> float:
     """Return the largest speed [m/s] at which a robot stops within what it sees at most.
 
-    ``free_things`` and ``free_robots`` [m] are the horizon less radius and clearance, ``delay`` [s] is what passes until
-    the next command works. x + b <= free of things. Of robots x + 2 b <= half of what is free when they yield;
+    ``free_things`` and ``free_robots`` [m] are the horizon less radius and clearance, ``delay`` [s] is what passes
+    until the next command works. x + b <= free of things. Of robots x + 2 b <= half of what is free when they yield;
     from ``stranger`` [m/s] > 0 that does not, the robot stands before it is there: x + b + stranger t <= free.
     An infinite ``free_robots`` means that nothing else moves.
     """

@@ -78,4 +78,5 @@ def _behind(ranges: np.ndarray, k: int, stop: int, rig: Rig) -> float:
     if width >= math.pi or (rig.sensor.range_min > touching and width * rig.sensor.range_min > rig.guarding.thinnest_m):
         return touching  # beyond the body something may stand too near to be measured
     fits = rig.body.radius_m / math.sin(0.5 * width) - rig.body.radius_m
-    return max(touching, min(fits, ranges[(k - 1) % total], ranges[stop % total]))
+    beside = min(float(ranges[(k - 1) % total]), float(ranges[stop % total]))
+    return max(touching, min(fits, beside))
