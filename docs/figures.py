@@ -157,7 +157,7 @@ def safe_of(rig: Rig, ranges: np.ndarray, rule: int = AHEAD) -> np.ndarray:
     """Return the safe directions of a scan as booleans; rule PRINTED masks the features."""
     sensor = rig.sensor
     edges, safe = np.zeros(ranges.size + 1, np.int16), np.zeros(ranges.size, np.uint8)
-    safe_directions(ranges, sensor, rig.reach[rule], edges, safe)
+    safe_directions(ranges, sensor, rig.reach[-1, rule], edges, safe)
     return safe.astype(bool)
 
 

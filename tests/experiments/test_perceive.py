@@ -71,7 +71,7 @@ def test_it_is_what_the_robots_kernels_say(forest_scans):
     for k, scan in enumerate(forest_scans):
         see = one_robot(rig).view
         see.masked[:] = scan
-        safe_directions(see.masked, rig.sensor, rig.reach[AHEAD], see.edges, see.safe)
+        safe_directions(see.masked, rig.sensor, rig.reach[-1, AHEAD], see.edges, see.safe)
         count = own_features(see)
         assert np.array_equal(seen.safe[k], see.safe == 1)
         assert len(seen.features[k]) == count > 0

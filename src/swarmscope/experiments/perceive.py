@@ -88,7 +88,7 @@ def perceive_repeatedly(repeats: int, swarm: Swarm) -> int:
     count = 0
     for _ in range(repeats):
         see = view_of(swarm, 0)
-        safe_directions(see.masked, see.rig.sensor, see.rig.reach[AHEAD], see.edges, see.safe)
+        safe_directions(see.masked, see.rig.sensor, see.rig.reach[-1, AHEAD], see.edges, see.safe)
         count = own_features(see)
     return count
 

@@ -59,7 +59,7 @@ def _look(
     for i in range(places.shape[0]):
         x, y = places[i, 0], places[i, 1]
         cast_static(world, x, y, 0.0, beams, ranges)
-        safe_directions(ranges, sensor, rig.reach[PRINTED], edges, safe)
+        safe_directions(ranges, sensor, rig.reach[-1, PRINTED], edges, safe)
         bearing = math.atan2(goals[i, 1] - y, goals[i, 0] - x)
         ahead = beam_of(bearing, sensor)
         blocked[i] = safe[ahead] == 0

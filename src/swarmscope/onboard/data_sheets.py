@@ -87,3 +87,36 @@ def rig_of(body: Body, lidar: Lidar, scans: Scans, options: Mapping[str, Any]) -
 def _part(kind: Any, options: Mapping[str, Any]) -> Any:
     """Return the options that a named tuple has."""
     return kind(**{name: options[name] for name in kind._fields})
+
+
+SLOWEST_MPS = 0.1
+"""A robot that may not be as fast as this, for what it sees, can hardly move."""
+
+
+def check_horizon(rig: Rig, dt_s: float) -> None:
+    """Raise ConfigError, with the number that would do, when a robot that decides every ``dt_s`` can hardly move.
+
+    It has to stop within what it has seen (docs/safety.md): static things, and, unless nothing else moves, robots that
+    come into view.
+    """
+    guarding, taken = rig.guarding, rig.body.radius_m + rig.guarding.clearance_m
+    speed = min(SLOWEST_MPS, rig.body.v_max_mps)
+    delay, brake = dt_s + guarding.latency_s, speed * speed / (2.0 * rig.body.a_max_mps2)
+    _check_view(rig, speed, taken + speed * delay + brake, "things", guarding.thinnest_m, 0.0)
+    if not guarding.others_mps > 0.0:
+        return
+    gap = 2.0 * (speed * delay + 2.0 * brake)
+    if not guarding.others_yield:
+        gap = speed * delay + brake + guarding.others_mps * (delay + speed / rig.body.a_max_mps2)
+    _check_view(rig, speed, taken + gap, "robots", 2.0 * rig.body.radius_m, rig.body.radius_m)
+
+
+def _check_view(rig: Rig, speed: float, need: float, what: str, width: float, nearer: float) -> None:
+    """Raise ConfigError unless ``need`` [m] lies within range, and ``width`` [m] shows between two beams there."""
+    why = f"to drive {speed:g} m/s this robot must see {what} {need:.2f} m away"
+    if rig.sensor.range_max < need:
+        raise ConfigError("lidar.range_m", f"{why}; {rig.sensor.range_max:g} m is too short")
+    finest = 2.0 * math.asin(min(1.0, 0.5 * width / (need + nearer))) if width > 0.0 else math.pi
+    if rig.sensor.increment > finest:
+        field = rig.sensor.increment * rig.sensor.beams
+        raise ConfigError("lidar.beams", f"{why}; {rig.sensor.beams} are too few, {math.ceil(field / finest)} would do")

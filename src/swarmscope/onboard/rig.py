@@ -6,7 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from swarmscope._jit import jit_inline
 from swarmscope.onboard.body import Body, Protection, protection_model
+from swarmscope.onboard.control.horizon import Horizon, horizon_of
 from swarmscope.onboard.perception.filters import feature_filter, window_half
 from swarmscope.onboard.perception.safety import Rule, reach_table
 from swarmscope.onboard.sensor import Sensor
@@ -28,6 +30,12 @@ class Guarding(NamedTuple):
     """How long an unseen neighbour is remembered."""
     latency_s: float = 0.0
     """Age of a scan when its command takes effect."""
+    thinnest_m: float = 0.02
+    """Width of the narrowest thing that must not be missed between two beams."""
+    others_mps: float = -1.0
+    """How fast others may be; below 0: as fast as this robot; 0: nothing else moves."""
+    others_yield: bool = True
+    """Whether others run the same guard."""
 
 
 class Safety(NamedTuple):
@@ -40,6 +48,8 @@ class Safety(NamedTuple):
     margin_m: float = 0.04
     narrow_m: float = 1.2
     """How far ahead a gap must be free that the body just fits."""
+    speed_step_mps: float = 0.125
+    """Margins follow the present speed in steps of this; 0: they are those of the top speed, as printed."""
 
 
 class Sharing(NamedTuple):
@@ -51,6 +61,8 @@ class Sharing(NamedTuple):
     """Features older than this are not used."""
 
 
+MOST_LEVELS = 32
+"""Levels of speed, 5 kB of tables each."""
 GUARDING, SAFETY, SHARING = Guarding(), Safety(), Sharing()
 
 
@@ -59,17 +71,21 @@ class Rig(NamedTuple):
 
     body: Body
     protection: Protection
+    """At the top speed."""
+    margins: np.ndarray
+    """(L, 7): the same at each level of speed, a row each."""
     sensor: Sensor
     half: int
     """alpha/2 in beams."""
     footprint: float
     """Radius that is swept: the body's plus a clearance [m]."""
+    horizon: Horizon
     guarding: Guarding
     sharing: Sharing
     look_ahead: float
     """Directions are free of obstacles up to here [m]."""
     reach: np.ndarray
-    """(5, BINS + 2) int16: what a return blocks by each of the rules named above."""
+    """(L, 5, BINS + 2) int16: what a return blocks at each level of speed by each of the rules named above."""
     cos: np.ndarray
     """(M,) of each beam."""
     sin: np.ndarray
@@ -89,32 +105,69 @@ def make_rig(
     angles = sensor.angle_min + sensor.increment * np.arange(sensor.beams)
     footprint = body.radius_m + guarding.footprint_clearance_m
     half = window_half(protection.alpha, sensor.increment)
-    rules = _rules(body, protection, safety)
-    reach = np.stack([reach_table(sensor.increment, sensor.range_max, footprint, rule) for rule in rules])
+    levels = [protection_model(slower) for slower in _slower(body, safety.speed_step_mps)]
+    reach = [
+        [reach_table(sensor.increment, sensor.range_max, footprint, rule) for rule in rules]
+        for rules in (_rules(body, level, protection, safety) for level in levels)
+    ]
     return Rig(
         body=body,
         protection=protection,
+        margins=np.array(levels),
         sensor=sensor,
         half=half,
         footprint=footprint,
-        guarding=Guarding(*(float(v) for v in guarding)),
+        horizon=horizon_of(body, sensor, guarding.thinnest_m),
+        guarding=_resolved(guarding, body),
         sharing=Sharing(bool(sharing.exact_features), float(sharing.max_age_s)),
         look_ahead=float(safety.look_ahead_m),
-        reach=reach,
+        reach=np.array(reach),
         cos=np.cos(angles),
         sin=np.sin(angles),
         taps=feature_filter(half),
     )
 
 
-def _rules(body: Body, protection: Protection, safety: Safety) -> tuple[Rule, ...]:
-    """Return the rules AHEAD to FITS."""
-    r, l_th, half_alpha = protection.r, protection.l_th, 0.5 * protection.alpha
+@jit_inline
+def level_of(speed: float, rig: Rig) -> int:
+    """Return the lowest level of speed that is not below ``speed`` [m/s]."""
+    levels = len(rig.reach)
+    for k in range(levels - 1):
+        if speed * levels <= rig.body.v_max_mps * (k + 1.000001):
+            return k
+    return levels - 1
+
+
+@jit_inline
+def margins_at(level: int, rig: Rig) -> Protection:
+    """Return the protection model at a level of speed."""
+    m = rig.margins[level]
+    return Protection(m[0], m[1], m[2], m[3], m[4], m[5], m[6])
+
+
+def _slower(body: Body, step: float) -> list[Body]:
+    """Return the data sheet at each level of speed, ``step`` [m/s] apart, the top speed last."""
+    levels = min(MOST_LEVELS, max(1, round(body.v_max_mps / step))) if step > 0.0 else 1
+    width = min(body.half_width_m, body.radius_m)
+    slower = [body._replace(v_max_mps=body.v_max_mps * k / levels, half_width_m=width) for k in range(1, levels)]
+    return [*slower, body]
+
+
+def _resolved(guarding: Guarding, body: Body) -> Guarding:
+    """Return plain numbers, the speed of others filled in."""
+    others = guarding.others_mps if guarding.others_mps >= 0.0 else body.v_max_mps
+    lengths = (float(value) for value in guarding[:-2])
+    return Guarding(*lengths, float(others), bool(guarding.others_yield))  # type: ignore[call-arg, arg-type]
+
+
+def _rules(body: Body, margins: Protection, fastest: Protection, safety: Safety) -> tuple[Rule, ...]:
+    """Return the rules AHEAD to FITS at a level of speed; features keep one mask, that of the top speed."""
+    r, l_th, half_alpha = margins.r, margins.l_th, 0.5 * margins.alpha
     sector = half_alpha if safety.sector else 0.0
     return (
         Rule(l_th, sector, safety.look_ahead_m, body.radius_m + safety.margin_m),
         Rule(safety.narrow_m or r),
         Rule(r),
-        Rule(l_th, half_alpha),
+        Rule(fastest.l_th, 0.5 * fastest.alpha),
         Rule(l_th),
     )

@@ -16,6 +16,7 @@ from swarmscope.onboard.body import Body
 from swarmscope.onboard.data_sheets import (
     check_address,
     check_body,
+    check_horizon,
     check_rate,
     options_of,
     planner_of,
@@ -168,6 +169,7 @@ class Robot:
         clearance = float(self._options["clearance_m"])
         scans = Scans(self.lidar, self._period_s, self.body.radius_m + clearance)
         rig = rig_of(self.body, self.lidar, scans, self._options)
+        check_horizon(rig, self._period_s)
         return scans, Rows(self._planner, rig, self.params, self.address)
 
     def _take_time_and_motion(self, now_s: Any, moved: Any) -> None:

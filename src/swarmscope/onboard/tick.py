@@ -9,6 +9,7 @@ from swarmscope._jit import jit, jit_paste
 from swarmscope.onboard.control.guard import guard
 from swarmscope.onboard.perception.features import align_features, extrema
 from swarmscope.onboard.perception.filters import filter_padded, prepare_scan
+from swarmscope.onboard.perception.mend import mend
 from swarmscope.onboard.perception.safety import safe_directions
 from swarmscope.onboard.rig import AHEAD, PRINTED
 from swarmscope.onboard.sharing.inbox import answer_all, read_inbox
@@ -27,8 +28,9 @@ def perceive(see: View, still_s: float) -> None:
     dx, dy = update_odometry(see.percept, see.shared)
     read_inbox(see)
     update_tracks(see.percept, see.shared, see.rig, dx, dy)
+    mend(see.scan, see.rig)
     mask_moving_neighbours(see, still_s)
-    safe_directions(see.masked, see.rig.sensor, see.rig.reach[AHEAD], see.edges, see.safe)
+    safe_directions(see.masked, see.rig.sensor, see.reach[AHEAD], see.edges, see.safe)
 
 
 @jit_paste
@@ -51,7 +53,7 @@ def own_features(see: View) -> int:
     Their mask is the printed rule (3): the look-ahead would hide whatever is near.
     """
     sensor = see.rig.sensor
-    safe_directions(see.masked, sensor, see.rig.reach[PRINTED], see.edges, see.narrow)
+    safe_directions(see.masked, sensor, see.reach[PRINTED], see.edges, see.narrow)
     prepare_scan(see.masked, sensor.range_min, sensor.range_max, sensor.wraps, see.rig.half, see.padded)
     filter_padded(see.padded, see.rig.taps, sensor.range_max, see.filtered)
     count = extrema(see.filtered, see.narrow, sensor, see.other.angles, see.other.distances)

@@ -11,8 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from swarmscope._jit import jit_paste
+from swarmscope.onboard.body import Protection
 from swarmscope.onboard.percept import DECISION, PERCEPT, Row, new_shared
-from swarmscope.onboard.rig import Rig
+from swarmscope.onboard.rig import Rig, level_of, margins_at
 from swarmscope.onboard.sharing.message import MAX_FEATURES
 
 
@@ -41,6 +42,10 @@ class View(NamedTuple):
     out: Row
     """What it decides (``DECISION``)."""
     rig: Rig
+    margins: Protection
+    """The protection model at today's speed."""
+    reach: np.ndarray
+    """(5, BINS + 2) int16: what a return blocks at today's speed, by each of the rules AHEAD to FITS."""
     narrow: np.ndarray
     """(M,) uint8: scratch for directions by another rule."""
     edges: np.ndarray
@@ -105,6 +110,7 @@ def new_swarm(robots: int, rig: Rig) -> Swarm:
 @jit_paste
 def view_of(swarm: Swarm, i: int) -> View:
     """Return what robot ``i`` may read and write."""
+    level = level_of(swarm.percepts[i]["speed"], swarm.rig)
     return View(
         swarm.scans[i],
         swarm.masked[i],
@@ -114,6 +120,8 @@ def view_of(swarm: Swarm, i: int) -> View:
         swarm.shared[i],
         swarm.decisions[i],
         swarm.rig,
+        margins_at(level, swarm.rig),
+        swarm.rig.reach[level],
         swarm.narrow[i],
         swarm.edges[i],
         swarm.padded[i],

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from swarmscope.onboard.body import Body
+from swarmscope.onboard.data_sheets import check_horizon
 from swarmscope.onboard.planners import Planner, load_planner
 from swarmscope.onboard.rig import Guarding, Rig, Safety, Sharing, make_rig
 from swarmscope.onboard.sensor import Sensor
@@ -63,7 +64,7 @@ def make_rig_of(scenario: Scenario) -> Rig:
     return make_rig(
         body,
         sensor,
-        Guarding(**guard.model_dump()),
+        Guarding(**guard.model_dump(exclude_none=True)),
         Safety(**safety.model_dump()),
         Sharing(exact_features=scenario.radio.exact_features),
     )
@@ -96,6 +97,8 @@ def make_setting(scenario: Scenario, setup: Setup, threads: int = 1) -> Setting:
     """Return the run of ``scenario`` in ``setup``, ready for the kernels."""
     planner = planner_of(scenario.planner)
     ticks = scenario.limit_s * scenario.lidar.rate_hz
+    rig, dt = make_rig_of(scenario), 1.0 / scenario.lidar.rate_hz
+    check_horizon(rig, dt)
     heavy = ticks * scenario.robots * scenario.lidar.beams > 4e7
     return Setting(
         world=compile_world(setup.world),
@@ -103,13 +106,13 @@ def make_setting(scenario: Scenario, setup: Setup, threads: int = 1) -> Setting:
         starts=setup.starts,
         goals=setup.goals,
         beams=make_beams(scenario.lidar.beams, math.radians(scenario.lidar.fov_deg), scenario.lidar.range_m),
-        rig=make_rig_of(scenario),
+        rig=rig,
         planner=planner,
         params=_with_run_seed(planner.params(scenario.planner.params), scenario.seed),
         noise=_noise_of(scenario.noise),
         radio=Radio(**scenario.radio.model_dump(exclude={"exact_features"})),
         seed=scenario.seed,
-        dt=1.0 / scenario.lidar.rate_hz,
+        dt=dt,
         substeps=scenario.substeps,
         limit_s=scenario.limit_s,
         threads=threads,

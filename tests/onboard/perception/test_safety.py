@@ -85,7 +85,7 @@ def test_the_sector_rule_is_the_printed_filter(ranges):
 
 @given(scans(360), st.integers(0, 359))
 def test_a_full_circle_has_no_seam(ranges, turn):
-    reach = RIG.reach[AHEAD]
+    reach = RIG.reach[-1, AHEAD]
     assert (safe_of(np.roll(ranges, turn), reach) == np.roll(safe_of(ranges, reach), turn)).all()
 
 
@@ -150,19 +150,19 @@ def test_no_more_is_blocked_than_the_rule_says(s, bearing):
 def test_an_invalid_beam_blocks_a_quarter_turn_to_either_side(bad, level):
     ranges = np.full(360, math.inf, np.float32)
     ranges[200] = bad
-    safe = safe_of(ranges, RIG.reach[level], range_min=0.1)
+    safe = safe_of(ranges, RIG.reach[-1, level], range_min=0.1)
     turn = np.abs((np.arange(360) - 200 + 180) % 360 - 180)
     assert (safe[turn <= 90] == 0).all()
     assert (safe[turn > 91] == 1).all()
 
 
 def test_all_beams_invalid_leaves_no_direction():
-    assert safe_of(np.full(360, math.nan, np.float32), RIG.reach[AHEAD]).sum() == 0
+    assert safe_of(np.full(360, math.nan, np.float32), RIG.reach[-1, AHEAD]).sum() == 0
 
 
 def test_open_space_is_safe_everywhere():
-    assert safe_of(np.full(360, math.inf, np.float32), RIG.reach[AHEAD]).all()
-    assert safe_of(np.full(360, 5.0, np.float32), RIG.reach[AHEAD]).all()
+    assert safe_of(np.full(360, math.inf, np.float32), RIG.reach[-1, AHEAD]).all()
+    assert safe_of(np.full(360, 5.0, np.float32), RIG.reach[-1, AHEAD]).all()
 
 
 @pytest.mark.parametrize("level", [AHEAD, NARROW, ESCAPE])
@@ -171,7 +171,7 @@ def test_directions_at_the_border_of_the_field_of_view_are_not_safe(fov_deg, lev
     """What is beside the outermost beam has not been seen: alpha/2 of the published robot is 30 degrees."""
     sensor = make_sensor(beams=fov_deg + 1, fov=math.radians(fov_deg))
     rig = rig_of(sensor=sensor)
-    safe = safe_of(np.full(sensor.beams, math.inf, np.float32), rig.reach[level], wraps=False)
+    safe = safe_of(np.full(sensor.beams, math.inf, np.float32), rig.reach[-1, level], wraps=False)
     assert (safe[: rig.half] == 0).all()
     assert (safe[-rig.half :] == 0).all()
     assert safe[rig.half + 1 : -rig.half - 1].all()
@@ -182,7 +182,7 @@ def test_gaps_narrower_than_the_body_are_closed_and_wider_ones_open():
     for gap, free in ((0.30, False), (0.35, False), (0.40, True), (0.60, True)):
         half = 0.5 * gap
         scan = scan_at(circles_world([(0.5, half + 0.2, 0.2), (0.5, -half - 0.2, 0.2)]), rig)
-        assert bool(safe_of(scan, rig.reach[NARROW])[180]) is free
+        assert bool(safe_of(scan, rig.reach[-1, NARROW])[180]) is free
 
 
 @given(st.floats(-20.0, 20.0))

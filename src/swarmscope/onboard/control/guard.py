@@ -1,10 +1,11 @@
 """The last check before the wheels, the same for every planner: braking distance along the swept footprint.
 
-A command is let through only if the robot, having executed it until the next tick (plus the age of its scan),
-can still brake to a stop without its disc coming closer to a return than the clearance (GIWT 1-2; the braking
-distance is Nav-SCOPE's s_b). Other robots move: each may use only its half of the gap between two robots, and
-keeps its braking distance twice, so that after both have moved each can still stop in its half (docs/safety.md
-has the argument). If nothing passes, the robot brakes straight on, which the previous tick has shown to be free.
+A command is let through only if the robot, having executed it until the next tick (plus the age of its scan), can still
+brake to a stop within what it has seen to be free, its disc no closer to a return than the clearance (GIWT 1-2; the
+braking distance is Nav-SCOPE's s_b). What lies behind a return, between two beams or beyond the range is not seen.
+Other robots move: each may use only its half of the gap between two, and keeps its braking distance twice, so that
+after both have moved each can still stop in its half. docs/safety.md has the argument. If nothing passes, the robot
+brakes straight on, which the previous tick has shown to be free.
 """
 
 from __future__ import annotations
@@ -16,59 +17,88 @@ import numpy as np
 
 from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.geometry import point_segment_distance
+from swarmscope.onboard.control.horizon import horizon_speed
 from swarmscope.onboard.control.unicycle import ramp
-from swarmscope.onboard.percept import PEERS, Row
+from swarmscope.onboard.percept import MAX_NEIGHBOURS, PEERS, Row
+from swarmscope.onboard.perception.mend import body_and_clearance, least_range
 from swarmscope.onboard.rig import Rig
 from swarmscope.onboard.sharing.tracks import neighbour_reach
 from swarmscope.onboard.view import View
 
 STEPS = 4
 """Straight pieces that stand for the arc driven until the next tick."""
-FRACTIONS = (1.0, 0.8, 0.6, 0.4, 0.2, 0.1, 0.0)
+FRACTIONS = (1.0, 0.8, 0.6, 0.4, 0.2, 0.1, 0.05, 0.0)
 
 
-class Motion(NamedTuple):
-    """Where a command leads, body frame: at the next tick, and stopped after it by braking straight on [m]."""
+class Way(NamedTuple):
+    """Where a command leads, body frame [m]: four points until the next tick, the stop after it, and the braking."""
 
-    moved_x: float
-    moved_y: float
-    stopped_x: float
-    stopped_y: float
+    x1: float
+    y1: float
+    x2: float
+    y2: float
+    x3: float
+    y3: float
+    x4: float
+    y4: float
+    x5: float
+    y5: float
+    brake: float
+    turns: bool
+    """Whether it is not straight."""
 
 
 @jit
 def guard(see: View) -> bool:
     """Lower the speed that was decided until it is safe; return whether it had to.
 
-    The raw scan counts: invalid beams (NaN, below range_min) forbid motion towards them. ``see.edges`` is scratch.
+    ``see.edges`` is scratch. What is no number, and time that does not pass, brake.
     """
-    body = see.rig.body
-    wanted, w = see.out["v"], see.out["w"]
-    if not (math.isfinite(wanted) and math.isfinite(w)):
-        wanted, w = 0.0, 0.0
+    percept, body, guarding = see.percept, see.rig.body, see.rig.guarding
+    dt, speed = percept["dt_s"], percept["speed"]
+    if not (0.0 < dt < math.inf and abs(speed) < math.inf and abs(percept["compass"]) < math.inf):
+        see.out["v"], see.out["w"] = 0.0, 0.0
+        return True
+    asked, w = see.out["v"], see.out["w"]
+    if not (abs(asked) < math.inf and abs(w) < math.inf):
+        asked, w = 0.0, 0.0
     w = min(body.w_max_radps, max(-body.w_max_radps, w))
-    wanted = min(body.v_max_mps, max(0.0, wanted))
-    count, nearest = _near_beams(see.scan, see.percept["dt_s"], see.rig, see.edges)
-    need = min(body.radius_m + see.rig.guarding.clearance_m, nearest - 1e-6)  # already too close: never closer
+    asked = min(body.v_max_mps, max(0.0, asked))
+    wanted = min(asked, _horizon_speed(see.rig, dt))
+    count, nearest = _near_beams(see, max(speed, min(wanted, speed + body.a_max_mps2 * dt)))
+    need = min(body.radius_m + guarding.clearance_m, nearest - 1e-6)  # already too close: never closer
     for fraction in FRACTIONS:
         v = wanted * fraction
         if _passes(see, v, w, count, need):
             see.out["v"], see.out["w"] = v, w
-            return fraction < 1.0
-    see.out["v"], see.out["w"] = 0.0, 0.0 if see.percept["speed"] > 1e-6 else w
+            return bool(v < asked)
+    see.out["v"], see.out["w"] = 0.0, 0.0 if speed > 1e-6 else w
     return True
 
 
 @jit_inner
-def _near_beams(ranges: np.ndarray, dt: float, rig: Rig, near: np.ndarray) -> tuple[int, float]:
-    """Collect the beams that could matter within this tick's motion and the braking after it.
+def _horizon_speed(rig: Rig, dt: float) -> float:
+    """Return the speed that the longest view allows."""
+    guarding, taken = rig.guarding, rig.body.radius_m + rig.guarding.clearance_m
+    robots = rig.horizon.robots - taken if guarding.others_mps > 0.0 else math.inf
+    stranger = 0.0 if guarding.others_yield else guarding.others_mps
+    return horizon_speed(rig.horizon.things - taken, robots, dt + guarding.latency_s, rig.body.a_max_mps2, stranger)
 
-    Return how many, and the smallest valid range among them [m].
+
+@jit_inner
+def _near_beams(see: View, speed: float) -> tuple[int, float]:
+    """Collect the beams that could matter for a robot that is at most so fast until the next tick, into ``see.edges``.
+
+    Return how many, and the smallest range among them [m].
     """
-    body = rig.body
-    brakes = 2.0 * body.v_max_mps * body.v_max_mps / body.a_max_mps2
-    reach = body.v_max_mps * (dt + rig.guarding.latency_s) + brakes
-    limit = body.radius_m + 2.0 * rig.guarding.clearance_m + reach
+    rig, ranges, near = see.rig, see.scan, see.edges
+    body, guarding = rig.body, rig.guarding
+    delay = see.percept["dt_s"] + guarding.latency_s
+    way, brake = speed * delay, speed * speed / (2.0 * body.a_max_mps2)
+    limit = body.radius_m + guarding.clearance_m + way + brake
+    if guarding.others_mps > 0.0:
+        stranger = 0.0 if guarding.others_yield else guarding.others_mps * (delay + speed / body.a_max_mps2)
+        limit += max(way + 3.0 * brake, stranger)
     least = least_range(rig)
     count = 0
     nearest = math.inf
@@ -81,62 +111,95 @@ def _near_beams(ranges: np.ndarray, dt: float, rig: Rig, near: np.ndarray) -> tu
     return count, nearest
 
 
-@jit_inline
-def least_range(rig: Rig) -> float:
-    """Return the smallest range that can be a return of something else: others are invalid, or inside the body."""
-    return max(rig.sensor.range_min, 0.5 * rig.body.radius_m)
+@jit_inner
+def _way(speed: float, v: float, w: float, see: View) -> Way:
+    """Return the way of commanding (v, w) at ``speed``."""
+    a_max = see.rig.body.a_max_mps2
+    step = see.percept["dt_s"] / STEPS
+    x0 = speed * see.rig.guarding.latency_s
+    speed, way = ramp(speed, v, a_max, step)
+    x1, y1 = x0 + way * math.cos(0.5 * w * step), way * math.sin(0.5 * w * step)
+    speed, way = ramp(speed, v, a_max, step)
+    x2, y2 = x1 + way * math.cos(1.5 * w * step), y1 + way * math.sin(1.5 * w * step)
+    speed, way = ramp(speed, v, a_max, step)
+    x3, y3 = x2 + way * math.cos(2.5 * w * step), y2 + way * math.sin(2.5 * w * step)
+    speed, way = ramp(speed, v, a_max, step)
+    x4, y4 = x3 + way * math.cos(3.5 * w * step), y3 + way * math.sin(3.5 * w * step)
+    brake = speed * speed / (2.0 * a_max)
+    x5, y5 = x4 + brake * math.cos(4.0 * w * step), y4 + brake * math.sin(4.0 * w * step)
+    return Way(x1, y1, x2, y2, x3, y3, x4, y4, x5, y5, brake, w != 0.0)
 
 
 @jit_inner
 def _passes(see: View, v: float, w: float, count: int, need: float) -> bool:
-    """Tell whether commanding (v, w) keeps ``need`` [m] clear of every near beam, and of every neighbour's half."""
+    """Tell whether commanding (v, w) keeps ``need`` [m] off every near return, and out of others' halves."""
     rig, percept = see.rig, see.percept
-    body = rig.body
-    v0 = percept["speed"]
-    yaw = 0.0
-    step = percept["dt_s"] / STEPS
-    speed = v0
-    x0, y0 = v0 * rig.guarding.latency_s, 0.0
-    x1, y1, x2, y2, x3, y3, x4, y4 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    x, y = x0, y0
-    for k in range(STEPS):
-        speed, way = ramp(speed, v, body.a_max_mps2, step)
-        x += way * math.cos(yaw + 0.5 * w * step)
-        y += way * math.sin(yaw + 0.5 * w * step)
-        yaw += w * step
-        if k == 0:
-            x1, y1 = x, y
-        elif k == 1:
-            x2, y2 = x, y
-        elif k == 2:
-            x3, y3 = x, y
-        else:
-            x4, y4 = x, y
-    brake = speed * speed / (2.0 * body.a_max_mps2)
-    x5, y5 = x + brake * math.cos(yaw), y + brake * math.sin(yaw)
-    if x5 * x5 + y5 * y5 + brake < 1e-10 and v0 < 1e-6:
+    speed = percept["speed"]
+    way = _way(speed, v, w, see)
+    if way.x5 * way.x5 + way.y5 * way.y5 + way.brake < 1e-10 and speed < 1e-6:
         return True
-    motion = Motion(x4, y4, x5, y5)
-    if not _clear_of_tracks(percept, see.shared, motion, rig):
+    alone = not rig.guarding.others_mps > 0.0
+    met = _met_by(v, percept["dt_s"], rig)
+    if not alone and not _clear_of_tracks(see, way, met):
         return False
+    beyond = _listed_up_to(percept, rig)
+    total = rig.sensor.beams
     for k in range(count):
         n = see.edges[k]
         s = see.scan[n]
-        if not s >= least_range(rig):  # forbid that way
-            s = body.radius_m + rig.guarding.clearance_m
+        if not s >= least_range(rig):
+            s = body_and_clearance(rig)
         px, py = s * rig.cos[n], s * rig.sin[n]
-        gap = _point_gap(percept, see.shared, px, py, rig)
-        if gap and not _in_own_half(px, py, s, motion, rig):
+        if _closer(px, py, way, need) or (way.turns and _shadowed(px, py, rig.cos[n], rig.sin[n], way, need)):
             return False
-        if (
-            point_segment_distance(px, py, 0.0, 0.0, x1, y1) < need
-            or point_segment_distance(px, py, x1, y1, x2, y2) < need
-            or point_segment_distance(px, py, x2, y2, x3, y3) < need
-            or point_segment_distance(px, py, x3, y3, x4, y4) < need
-            or point_segment_distance(px, py, x4, y4, x5, y5) < need
-        ):
+        if alone:
+            continue
+        if s > beyond or _point_gap(percept, see.shared, px, py, rig):
+            if not _in_own_half(px, py, s, way, met, rig):
+                return False
+        elif _is_corner(see.scan, n, total, rig) and not _stops_before(px, py, s, way, met, rig):
             return False
     return True
+
+
+@jit_inline
+def _closer(px: float, py: float, way: Way, need: float) -> bool:
+    """Tell whether the way comes closer than ``need`` [m] to the return at (px, py)."""
+    return bool(
+        point_segment_distance(px, py, 0.0, 0.0, way.x1, way.y1) < need
+        or point_segment_distance(px, py, way.x1, way.y1, way.x2, way.y2) < need
+        or point_segment_distance(px, py, way.x2, way.y2, way.x3, way.y3) < need
+        or point_segment_distance(px, py, way.x3, way.y3, way.x4, way.y4) < need
+        or point_segment_distance(px, py, way.x4, way.y4, way.x5, way.y5) < need
+    )
+
+
+@jit_inner
+def _shadowed(px: float, py: float, ux: float, uy: float, way: Way, need: float) -> bool:
+    """Tell whether a way that turns comes closer than ``need`` [m] to what the return at (px, py) hides.
+
+    That is the ray from there on along unit direction u. All of a straight way lies this side of its returns.
+    """
+    off4 = _off_ray(way.x4 - px, way.y4 - py, ux, uy)
+    off5 = _off_ray(way.x5 - px, way.y5 - py, ux, uy)
+    if abs(off4) < need or abs(off5) < need:
+        return True
+    return bool(off4 * off5 < 0.0 and off4 * off5 > -math.inf)
+
+
+@jit_inline
+def _off_ray(x: float, y: float, ux: float, uy: float) -> float:
+    """Return how far (x, y) lies beside the ray from the origin along u, left positive; inf behind its start."""
+    return ux * y - uy * x if ux * x + uy * y > 0.0 else math.inf
+
+
+@jit_inline
+def _listed_up_to(percept: Row, rig: Rig) -> float:
+    """Return up to which range every robot in sight is listed [m]: inf unless the list is full."""
+    k = MAX_NEIGHBOURS - 1
+    if percept["n_neighbours"] < MAX_NEIGHBOURS:
+        return math.inf
+    return math.sqrt(percept["neighbour_x"][k] ** 2 + percept["neighbour_y"][k] ** 2) - 1.5 * rig.body.radius_m
 
 
 @jit_inner
@@ -155,26 +218,60 @@ def _point_gap(percept: Row, shared: Row, px: float, py: float, rig: Rig) -> boo
 
 
 @jit_inner
-def _in_own_half(px: float, py: float, s: float, motion: Motion, rig: Rig) -> bool:
-    """Tell whether a motion keeps to its half of the way to (px, py); its braking counts twice.
+def _is_corner(ranges: np.ndarray, n: int, total: int, rig: Rig) -> bool:
+    """Tell whether a robot can come into view past the return of beam n: beside it there is room for one behind it."""
+    room = ranges[n] + 2.0 * (rig.body.radius_m + rig.guarding.clearance_m)
+    after, before = n + 1, n - 1
+    if after == total:
+        after = 0 if rig.sensor.wraps else n
+    if before < 0:
+        before = total - 1 if rig.sensor.wraps else n
+    return bool(ranges[after] > room or ranges[before] > room)
 
-    (px, py) is the nearest known point of a neighbour's body at range ``s``.
+
+@jit_inner
+def _stops_before(px: float, py: float, s: float, way: Way, met: float, rig: Rig) -> bool:
+    """Tell whether the robot can stop before it meets one that comes into view past the corner at (px, py).
+
+    Both keep out of the circle round it that their body fills: x + b <= s - radius - half the clearance.
+    """
+    towards = max(way.x4 * px + way.y4 * py, way.x5 * px + way.y5 * py) / s
+    return bool(towards <= 1e-6 or towards + met <= s - rig.body.radius_m - 0.5 * rig.guarding.clearance_m)
+
+
+@jit_inline
+def _met_by(v: float, dt: float, rig: Rig) -> float:
+    """Return how far one that does not yield comes until a robot that drives at ``v`` [m/s] stands [m]; others 0."""
+    if rig.guarding.others_yield:
+        return 0.0
+    return rig.guarding.others_mps * (dt + rig.guarding.latency_s + v / rig.body.a_max_mps2)
+
+
+@jit_inner
+def _in_own_half(px: float, py: float, s: float, way: Way, met: float, rig: Rig) -> bool:
+    """Tell whether a way keeps to its half of the gap to (px, py); its braking counts twice.
+
+    (px, py) is the nearest known point of a neighbour's body at range ``s``. Before one that does not yield the robot
+    stands before it is reached.
     """
     if s <= 1e-6:
-        return motion.stopped_x * motion.stopped_x + motion.stopped_y * motion.stopped_y < 1e-9
+        return way.x5 * way.x5 + way.y5 * way.y5 < 1e-9
     nx, ny = px / s, py / s
-    moved = motion.moved_x * nx + motion.moved_y * ny
-    stopped = motion.stopped_x * nx + motion.stopped_y * ny
+    moved = way.x4 * nx + way.y4 * ny
+    stopped = way.x5 * nx + way.y5 * ny
     towards = max(moved, stopped)
     if towards <= 1e-6:
         return True
     free = s - rig.body.radius_m - rig.guarding.clearance_m
-    return towards + max(0.0, stopped - moved) <= 0.5 * free
+    if rig.guarding.others_yield:
+        return towards + max(0.0, stopped - moved) <= 0.5 * free
+    return towards + met <= free
 
 
 @jit_inner
-def _clear_of_tracks(percept: Row, shared: Row, motion: Motion, rig: Rig) -> bool:
+def _clear_of_tracks(see: View, way: Way, met: float) -> bool:
     """Apply the half-gap rule to every tracked neighbour, seen now or remembered."""
+    percept, shared, rig = see.percept, see.shared, see.rig
     c, s = math.cos(percept["compass"]), math.sin(percept["compass"])
     for t in range(PEERS):
         if shared["track_id"][t] < 0:
@@ -182,11 +279,11 @@ def _clear_of_tracks(percept: Row, shared: Row, motion: Motion, rig: Rig) -> boo
         x = c * shared["track_x"][t] + s * shared["track_y"][t]
         y = c * shared["track_y"][t] - s * shared["track_x"][t]
         d = math.sqrt(x * x + y * y)
-        error = rig.sensor.position_sigma * d
-        surface = d - rig.body.radius_m - error
-        if surface > 4.0 * rig.body.radius_m + 1.0 or d < 1e-6:
-            continue
+        if d < 1e-6:
+            return False
+        surface = d - rig.body.radius_m - rig.sensor.position_sigma * d
+        surface = max(surface, 1e-6)
         scale = surface / d
-        if not _in_own_half(x * scale, y * scale, max(surface, 1e-6), motion, rig):
+        if not _in_own_half(x * scale, y * scale, surface, way, met, rig):
             return False
     return True

@@ -17,7 +17,7 @@ def request_ahead(see: View, ahead_s: float, every_s: float) -> None:
     if see.percept["now_s"] - see.shared["asked_s"] < every_s:
         return
     rig = see.rig
-    horizon = max(rig.protection.l_th, rig.look_ahead) + ahead_s * rig.body.v_max_mps
+    horizon = max(see.margins.l_th, rig.look_ahead) + ahead_s * rig.body.v_max_mps
     if obstacle_ahead(see, horizon):
         ask_neighbours(see)
 
@@ -42,7 +42,7 @@ def obstacle_ahead(see: View, horizon: float) -> bool:
 def ask_neighbours(see: View) -> None:
     """Start a round of requests to every neighbour seen now in the pass band (sigma_a, 3 sigma_a]."""
     start_round(see)
-    percept, sigma = see.percept, see.rig.protection.sigma_a
+    percept, sigma = see.percept, see.margins.sigma_a
     for k in range(percept["n_neighbours"]):
         x, y = percept["neighbour_x"][k], percept["neighbour_y"][k]
         distance = math.sqrt(x * x + y * y)

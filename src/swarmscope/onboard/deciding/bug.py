@@ -121,7 +121,7 @@ def advance(see: View, memory: Row, driving: Driving) -> bool:
         halt(see)
         _say(see, memory, R_ARRIVED)
         return True
-    final = goal <= see.rig.protection.l_th + see.rig.footprint
+    final = goal <= see.margins.l_th + see.rig.footprint
     free = goal_is_free(see, final)
     reason = R_FINAL if final and free else R_FREE
     if memory["side"] != 0:
@@ -203,7 +203,7 @@ def follow(see: View, memory: Row, driving: Driving) -> None:
     heading, found = first_safe(see.safe, start, side, sensor)
     if not found:
         reason = R_DEAD_END
-        safe_directions(see.masked, sensor, see.rig.reach[ESCAPE_RULE], see.edges, see.narrow)
+        safe_directions(see.masked, sensor, see.reach[ESCAPE_RULE], see.edges, see.narrow)
         heading, found = first_safe(see.narrow, start, side, sensor)
     if found:
         memory["heading"] = see.percept["compass"] + heading
@@ -226,7 +226,7 @@ def follow(see: View, memory: Row, driving: Driving) -> None:
 @jit_inner
 def _drive(see: View, heading: float, driving: Driving) -> None:
     """Ask for driving towards ``heading`` (body frame) as fast as (2) and the way left allow."""
-    view = 0.5 * see.rig.protection.alpha
+    view = 0.5 * see.margins.alpha
     allowed = safe_speed(see.scan, see.rig, heading, see.percept["dt_s"], view)
     head_for(see, heading, min(last_speed(see, driving.arrive_m), max(allowed, driving.creep)))
 

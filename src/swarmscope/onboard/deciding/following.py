@@ -125,7 +125,7 @@ def _narrower(see: View, way: Way, start: float, side: int, wide_turn: float) ->
     for rule in range(NARROW, ESCAPE_RULE + 1):
         if way.found and (rule == ESCAPE_RULE or way.turn <= wide_turn):
             break
-        if safe_directions(see.masked, sensor, see.rig.reach[rule], see.edges, see.narrow) == 0:
+        if safe_directions(see.masked, sensor, see.reach[rule], see.edges, see.narrow) == 0:
             continue
         other = first_way(see.narrow, start, side, sensor)
         if other.found and (not way.found or other.turn < way.turn):
@@ -142,7 +142,7 @@ def _keep_turning(see: View, memory: Row, heading: float) -> float:
     sensor = see.rig.sensor
     before = wrap_angle(memory["heading"] - see.percept["compass"])
     if memory["turning"] and abs(before) > FULL_SPEED_WITHIN:
-        safe_directions(see.masked, sensor, see.rig.reach[ESCAPE_RULE], see.edges, see.narrow)
+        safe_directions(see.masked, sensor, see.reach[ESCAPE_RULE], see.edges, see.narrow)
         n = beam_of(before, sensor)
         if n >= 0 and see.narrow[n]:
             return before

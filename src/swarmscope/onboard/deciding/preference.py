@@ -147,7 +147,7 @@ def _narrow_way(see: View, start: float, side: int) -> Way:
     """Return the first direction from ``start`` on ``side`` in which the body fits, for a while, or at first."""
     way = Way(0.0, 0.0, False)
     for rule in range(NARROW, ESCAPE + 1):
-        if safe_directions(see.masked, see.rig.sensor, see.rig.reach[rule], see.edges, see.narrow) > 0:
+        if safe_directions(see.masked, see.rig.sensor, see.reach[rule], see.edges, see.narrow) > 0:
             way = first_way(see.narrow, start, side, see.rig.sensor)
         if way.found:
             break

@@ -45,7 +45,7 @@ def last_speed(see: View, arrive_m: float) -> float:
 def is_final(see: View) -> bool:
     """Tell whether the goal is so near that only the way to the goal itself has to be free."""
     rig = see.rig
-    return bool(see.percept["goal_distance"] <= max(rig.protection.l_th + rig.footprint, rig.look_ahead))
+    return bool(see.percept["goal_distance"] <= max(see.margins.l_th + rig.footprint, rig.look_ahead))
 
 
 @jit

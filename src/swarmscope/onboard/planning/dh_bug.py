@@ -87,7 +87,7 @@ def decide(see: View, memory: Row, params: Params) -> None:
     rule = NARROW if params.long_gaps else FITS
     if params.sector and not memory["looped"]:
         rule = PRINTED
-    safe_directions(see.masked, see.rig.sensor, see.rig.reach[rule], see.edges, see.safe)
+    safe_directions(see.masked, see.rig.sensor, see.reach[rule], see.edges, see.safe)
     driving = driving_of(params)
     if not bug.advance(see, memory, driving):
         if memory["mode"] == KEY_POINT:

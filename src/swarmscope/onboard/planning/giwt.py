@@ -167,7 +167,7 @@ def _prepare(see: View, memory: Row, params: Params) -> None:
     for q in range(see.shared["ask_n"]):
         if see.shared["ask_direction"][q] >= 0:
             memory["thinks"] = 1
-    safe_directions(see.masked, see.rig.sensor, see.rig.reach[FITS], see.edges, see.safe)
+    safe_directions(see.masked, see.rig.sensor, see.reach[FITS], see.edges, see.safe)
     if bug.advance(see, memory, driving_of(params)):
         memory["stage"] = DRIVES
         if _should_ask(see, memory, params):
@@ -188,7 +188,7 @@ def _prepare(see: View, memory: Row, params: Params) -> None:
 def _should_ask(see: View, memory: Row, params: Params) -> bool:
     """Tell whether a robot on its way asks now, because a key point may be near."""
     rig = see.rig
-    horizon = max(rig.look_ahead, rig.protection.l_th) + params.ask_ahead_s * rig.body.v_max_mps
+    horizon = max(rig.look_ahead, see.margins.l_th) + params.ask_ahead_s * rig.body.v_max_mps
     return bool(
         params.ask
         and memory["mode"] != AT_GOAL
@@ -209,7 +209,7 @@ def key_point_near(see: View, ahead_s: float, key_deg: float) -> bool:
     way = ahead_s * see.rig.body.v_max_mps
     for n in range(sensor.beams):
         nearer[n] = max(sensor.range_min, masked[n] - way) if masked[n] >= sensor.range_min else masked[n]
-    safe_directions(nearer, sensor, see.rig.reach[FITS], see.edges, see.narrow)
+    safe_directions(nearer, sensor, see.reach[FITS], see.edges, see.narrow)
     return bool(min(turn_to_safe(see, see.narrow, 1), turn_to_safe(see, see.narrow, -1)) > math.radians(key_deg))
 
 

@@ -119,8 +119,8 @@ def obstacle_stops(see: View) -> bool:
     """
     rig, masked, bearing = see.rig, see.masked, see.percept["goal_bearing"]
     printed = rig.look_ahead <= 0.0
-    reach = rig.protection.l_th if printed else max(rig.protection.l_th, rig.look_ahead)
-    half = 0.5 * rig.protection.alpha if printed else math.asin(min(1.0, rig.footprint / reach))
+    reach = see.margins.l_th if printed else max(see.margins.l_th, rig.look_ahead)
+    half = 0.5 * see.margins.alpha if printed else math.asin(min(1.0, rig.footprint / reach))
     edge = math.cos(half)
     own = propulsion(1.0, P_FREE)
     constant = obstacle_constant(own, reach, half)

@@ -1,0 +1,82 @@
+"""Broken readings: a hole in the scan that nothing as large as the body fits into is bridged, a wider one blocks."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from swarmscope._jit import jit, jit_inline, jit_inner
+from swarmscope.onboard.rig import Rig
+
+BESIDE = 1e-6
+"""A blocked beam ends this far outside of what the guard keeps free [m]."""
+
+
+@jit_inline
+def least_range(rig: Rig) -> float:
+    """Return the smallest range that can be a return of something else: others are broken, or inside the body."""
+    return max(rig.sensor.range_min, 0.5 * rig.body.radius_m)
+
+
+@jit_inline
+def body_and_clearance(rig: Rig) -> float:
+    """Return the range of what stands just outside of what the guard keeps free: the way towards it is blocked."""
+    return rig.body.radius_m + rig.guarding.clearance_m + BESIDE
+
+
+@jit
+def mend(ranges: np.ndarray, rig: Rig) -> int:
+    """Replace broken readings (NaN, below ``least_range``) of ``ranges (M,)`` [m] in place; return how many there were.
+
+    A run of them becomes as near as the nearer of the two readings beside it, and never farther than a body in
+    the hole could be; with nothing sound beside it, it is what touches the body.
+    """
+    least = least_range(rig)
+    broken = 0
+    for n in range(ranges.size):
+        if not ranges[n] >= least:
+            broken += 1
+    if broken > 0:
+        _bridge(ranges, rig, least)
+    return broken
+
+
+@jit_inner
+def _bridge(ranges: np.ndarray, rig: Rig, least: float) -> None:
+    """Bridge every run of broken readings."""
+    total = ranges.size
+    first = 0
+    if rig.sensor.wraps:
+        while first < total and not ranges[first] >= least:
+            first += 1
+        if first == total:
+            first = 0
+    k = first
+    while k < first + total:
+        if ranges[k % total] >= least:
+            k += 1
+            continue
+        stop = k
+        while stop < first + total and not ranges[stop % total] >= least:
+            stop += 1
+        s = _behind(ranges, k, stop, rig)
+        for n in range(k, stop):
+            ranges[n % total] = s
+        k = stop
+
+
+@jit_inner
+def _behind(ranges: np.ndarray, k: int, stop: int, rig: Rig) -> float:
+    """Return the range that stands for the broken run of beams k .. stop - 1."""
+    total = ranges.size
+    touching = body_and_clearance(rig)
+    closed = rig.sensor.wraps and stop - k < total
+    if not closed and (k == 0 or stop == total):
+        return touching
+    width = (stop - k + 1) * rig.sensor.increment
+    if width >= math.pi or (rig.sensor.range_min > touching and width * rig.sensor.range_min > rig.guarding.thinnest_m):
+        return touching  # beyond the body something may stand too near to be measured
+    fits = rig.body.radius_m / math.sin(0.5 * width) - rig.body.radius_m
+    beside = min(float(ranges[(k - 1) % total]), float(ranges[stop % total]))
+    return max(touching, min(fits, beside))
