@@ -134,7 +134,7 @@ def test_walls_of_any_length_have_two_sides_of_as_many_pieces(length, angle):
 
 
 def test_walls_are_as_thick_as_the_narrowest_thing_that_the_guard_counts_on():
-    assert WALL_M == GUARDING.thinnest_m
+    assert GUARDING.thinnest_m == WALL_M
 
 
 def test_arrays_have_the_same_types_in_an_empty_and_a_full_world():

@@ -147,7 +147,7 @@ def _meet_robots(sim: Sim) -> None:
 
 @jit
 def _gaps_of(sim: Sim, i: int, first: int, stop: int, halt: bool) -> bool:
-    """Measure the gaps between robot i and every near robot with a larger number, pieces first .. stop - 1 of their paths.
+    """Measure robot i's gaps to near robots with larger numbers within pieces first .. stop - 1 of their paths.
 
     Return whether one touches that still moves; ``halt`` stops both, else the gap of such a pair is not noted.
     """

@@ -313,7 +313,7 @@ def _bars(a: Floats, b: Floats) -> list[Floats]:
 
 
 def _segment_rows(bars: list[Floats], solids: list[Floats]) -> Floats:
-    """Return what can be seen of walls, their long sides, and the edges of polygons (S, 4), in pieces that join exactly.
+    """Return the long sides of walls and the edges of polygons (S, 4), in pieces that share their ends exactly.
 
     The short sides of a wall's boxes lie within the wall.
     """
