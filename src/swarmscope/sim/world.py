@@ -138,7 +138,7 @@ class WorldSpec(_Model):
     obstacles: list[Obstacle] = Field(default_factory=list)
     """Circles, convex polygons, walls, and at most one occupancy grid; each names its ``type``."""
     bounds: tuple[Number, Number, Number, Number]
-    """Lower left and upper right corner of the world: x0, y0, x1, y1 [m]."""
+    """Lower left and upper right corner of what is drawn, no walls: x0, y0, x1, y1 [m]."""
 
     @model_validator(mode="after")
     def _check_world(self) -> Self:
