@@ -181,6 +181,8 @@ class World(NamedTuple):
     """Largest radius of a circle [m], 0 without circles."""
     segments: Floats
     """(S, 4) ax, ay, bx, by [m], none longer than `PIECE_M`, in bin order: sides of walls, edges of polygons."""
+    one_sided: Bytes
+    """(S,) 1 = side of a wall, seen from its right only: from anywhere else another part of the wall is before it."""
     vertices: Floats
     """(V, 2) corners of walls and of the convex polygons, counter-clockwise [m]."""
     vertex_start: Ints
@@ -220,6 +222,7 @@ def compile_world(spec: WorldSpec) -> World:
         circles=np.ascontiguousarray(circles[circle_order]),
         radius_max=float(circles[:, 2].max(initial=0.0)),
         segments=np.ascontiguousarray(segments[segment_order]),
+        one_sided=(segment_order < 2 * len(bars)).astype(np.uint8),
         vertices=np.ascontiguousarray(np.concatenate([np.zeros((0, 2)), *polygons])),
         vertex_start=np.cumsum([0, *(len(p) for p in polygons)], dtype=np.int64),
         bins=Bins(x0, y0, size, columns, rows, circle_start, segment_start, polygon_start, polygon_items),
@@ -313,7 +316,7 @@ def _bars(a: Floats, b: Floats) -> list[Floats]:
 
 
 def _segment_rows(bars: list[Floats], solids: list[Floats]) -> Floats:
-    """Return the long sides of walls and the edges of polygons (S, 4), in pieces that share their ends exactly.
+    """Return the long sides of walls, then the edges of polygons (S, 4), in pieces that share their ends exactly.
 
     The short sides of a wall's boxes lie within the wall.
     """
