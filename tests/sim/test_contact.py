@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarmscope.sim.contact import static_clearance
-from swarmscope.sim.world import Circle, Polygon, Wall, WorldSpec, compile_world, grid_from_solid
+from swarmscope.sim.world import WALL_M, Circle, Polygon, Wall, WorldSpec, compile_world, grid_from_solid
 
 BOUNDS = (0.0, 0.0, 10.0, 10.0)
 SQUARE = Polygon(points=[(2, 2), (2, 4), (4, 4), (4, 2)])
@@ -34,9 +34,13 @@ def clearance(world, a, b=None, limit=5.0):
         (Circle(center=(3, 0), radius=1), (2.1, 0), (2.1, 0), 0.0),
         (Circle(center=(3, 0), radius=1), (0, 2), (6, 2), 1.0),
         (Circle(center=(3, 0), radius=1), (0, 0.5), (6, 0.5), 0.0),
-        (Wall(points=[(0, 0), (8, 0)]), (1, 2), (1, 0.25), 0.25),
+        (Wall(points=[(0, 0), (8, 0)]), (1, 2), (1, 0.25), 0.24),
+        (Wall(points=[(0, 0), (8, 0)]), (-1, 0), (-1, 0), 0.99),
+        (Wall(points=[(0, 0), (8, 0)]), (9, 1), (9, 1), math.sqrt(2) - 0.01),
+        (Wall(points=[(0, 0), (8, 0)]), (3.3, 0.009), (3.3, 0.001), 0.0),
+        (Wall(points=[(0, 0), (8, 0), (8, 8)]), (8.5, -0.5), (8.5, -0.5), math.hypot(0.5, 0.5) - 0.01),
         (Wall(points=[(0, 0), (8, 0)]), (1, 2), (1, -2), 0.0),
-        (Wall(points=[(0, 0), (8, 0)]), (-3, 4), (-3, 4), 5.0),
+        (Wall(points=[(0, 0), (8, 0)]), (-3, 4), (-3, 4), 4.99),
         (SQUARE, (3, 3), (3, 3), 0.0),
         (SQUARE, (2.001, 3.99), (2.001, 3.99), 0.0),
         (SQUARE, (0, 3), (6, 3), 0.0),
@@ -111,12 +115,12 @@ def sampled_clearance(obstacles, a, b, count=4001):
         if isinstance(obstacle, Circle):
             best = min(best, (np.linalg.norm(p - obstacle.center, axis=1) - obstacle.radius).min())
             continue
-        points = np.array(obstacle.points)
+        points, thick = np.array(obstacle.points), 0.5 * WALL_M
         if isinstance(obstacle, Polygon):
             if inside_convex(points, p).any():
                 return 0.0
-            points = np.vstack([points, points[:1]])
-        best = min(best, *(to_segment(p, c, d).min() for c, d in pairwise(points)))
+            points, thick = np.vstack([points, points[:1]]), 0.0
+        best = min(best, *(to_segment(p, c, d).min() - thick for c, d in pairwise(points)))
     return max(best, 0.0)
 
 
@@ -205,4 +209,4 @@ def test_a_wall_is_found_from_anywhere_along_it_with_a_small_limit(seed):
     world = world_of(Wall(points=[a, b]))
     normal = np.array([a[1] - b[1], b[0] - a[0]]) / np.linalg.norm(b - a)
     for share in np.linspace(0, 1, 101):
-        assert clearance(world, a + share * (b - a) + 0.02 * normal, limit=0.03) == pytest.approx(0.02)
+        assert clearance(world, a + share * (b - a) + 0.03 * normal, limit=0.03) == pytest.approx(0.02)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from swarmscope.errors import ConfigError, InputFileError, UnknownNameError
-from swarmscope.sim.maps import load_map, load_movingai, packaged_map, save_map
+from swarmscope.sim.maps import closed, load_map, load_movingai, packaged_map, save_map
 from swarmscope.sim.world import Grid, grid_from_solid, solid_from_grid
 
 SETTINGS = {
@@ -35,6 +35,23 @@ def write_map(folder, content=b"P5\n2 2\n255\n\x00\xfe\xfe\xfe", name="map.pgm",
 def test_first_image_row_is_the_top(tmp_path):
     grid = load_map(write_map(tmp_path))
     assert grid == Grid(resolution=0.5, origin=(1.0, -2.0), width=2, height=2, rows=[(1, 0, 0)])
+
+
+@pytest.mark.parametrize("free", [[(1, 1)], [(0, 1)], [(2, 3)], [(1, 0), (1, 1)], [(0, 3)]])
+def test_a_map_that_is_free_at_its_edge_is_closed_beyond_it(free):
+    solid = np.ones((3, 4), np.uint8)
+    for row, col in free:
+        solid[row, col] = 0
+    grid = grid_from_solid(solid, 0.5, (1.0, -2.0))
+    shut = closed(grid)
+    if free == [(1, 1)]:
+        assert shut is grid
+        return
+    assert shut.origin == (0.5, -2.5)
+    cells = solid_from_grid(shut)
+    assert np.array_equal(cells[1:-1, 1:-1], solid)
+    assert cells[[0, -1]].all()
+    assert cells[:, [0, -1]].all()
 
 
 @pytest.mark.parametrize(

@@ -57,7 +57,7 @@ def test_a_wall_hides_a_neighbour_and_a_robot_too():
     sim = sensed(starts)
     assert neighbours(sim, 0)[0] == [1, 3]  # 2 is behind 1
     assert neighbours(sim, 1)[0] == [2, 0, 3]
-    sim = sensed(starts, world=world_of(wall((-1.0, 1.5), (1.0, 1.5))))
+    sim = sensed(starts, world=world_of(wall((-1.0, 1.5), (0.95, 1.5))))
     assert neighbours(sim, 0)[0] == [1]
     assert neighbours(sim, 3)[0] == [1, 2]  # past the wall's end
 

@@ -11,7 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
+from swarmscope.onboard.rig import GUARDING
 from swarmscope.sim.world import (
+    WALL_M,
     Circle,
     Grid,
     Polygon,
@@ -107,13 +109,32 @@ def test_description_survives_json():
 
 def test_walls_are_cut_into_pieces_that_join_exactly():
     world = compile_world(WorldSpec(obstacles=[Wall(points=[(0.1, 0.2), (3.3, 4.4)])], bounds=BOUNDS))
-    pieces = world.segments[np.argsort(world.segments[:, 0])]
-    lengths = np.hypot(pieces[:, 2] - pieces[:, 0], pieces[:, 3] - pieces[:, 1])
-    assert lengths.max() <= 1.0 + 1e-12
-    assert math.isclose(lengths.sum(), math.dist((0.1, 0.2), (3.3, 4.4)))
-    assert np.array_equal(pieces[1:, :2], pieces[:-1, 2:])
-    assert pieces[0, :2].tolist() == [0.1, 0.2]
-    assert pieces[-1, 2:].tolist() == [3.3, 4.4]
+    along = np.array([3.2, 4.2]) / math.hypot(3.2, 4.2)
+    aside = 0.5 * WALL_M * np.array([-along[1], along[0]])
+    for side in (1.0, -1.0):
+        a, b = np.array([0.1, 0.2]) + side * aside, np.array([3.3, 4.4]) + side * aside
+        ends = [(p, q) for p, q in world.segments.reshape(-1, 2, 2) if side * float((p - (0.1, 0.2)) @ aside) > 0.0]
+        pieces = np.array(sorted((sorted((p.tolist(), q.tolist())) for p, q in ends)))
+        lengths = np.linalg.norm(pieces[:, 1] - pieces[:, 0], axis=1)
+        assert lengths.max() <= 1.0 + 1e-12
+        assert math.isclose(lengths.sum(), math.dist(a, b))
+        assert np.array_equal(pieces[1:, 0], pieces[:-1, 1])
+        assert np.allclose([pieces[0, 0], pieces[-1, 1]], [a, b], rtol=0.0, atol=1e-15)
+    assert sorted(map(tuple, world.circles.tolist())) == [(0.1, 0.2, 0.5 * WALL_M), (3.3, 4.4, 0.5 * WALL_M)]
+
+
+@pytest.mark.parametrize("length", [5e-324, 1e-12, 1.0, 2.0, math.nextafter(2.0, 0.0), 7.0])
+@pytest.mark.parametrize("angle", [0.0, 0.3, 2.0])
+def test_walls_of_any_length_have_two_sides_of_as_many_pieces(length, angle):
+    end = (length * math.cos(angle), length * math.sin(angle))
+    world = compile_world(WorldSpec(obstacles=[Wall(points=[(0.0, 0.0), end])], bounds=BOUNDS))
+    assert len(world.segments) == 2 * (len(world.vertex_start) - 1)
+    assert np.all(np.isfinite(world.segments))
+    assert np.all(np.isfinite(world.vertices))
+
+
+def test_walls_are_as_thick_as_the_narrowest_thing_that_the_guard_counts_on():
+    assert GUARDING.thinnest_m == WALL_M
 
 
 def test_arrays_have_the_same_types_in_an_empty_and_a_full_world():

@@ -34,10 +34,9 @@ from swarmscope.scenarios.scenario import Scenario
 from swarmscope.scenarios.to_kernels import complete, make_setting
 from swarmscope.sim.loop import Setting, Trace, run
 from swarmscope.tasks import Setup
+from swarmscope.tasks._check import ARRIVE_M
 from swarmscope.user_files import short_name, text_of
 
-ARRIVE_M = 0.05
-"""Distance to the goal at which robots have arrived whose planner has no parameter ``arrive_m``."""
 KILO = 1000.0
 
 

@@ -142,7 +142,7 @@ class TaskModel(_Strict):
 
 
 class MapModel(_Strict):
-    """A map_server map; starts and goals are drawn from its free space."""
+    """A map_server map, solid beyond its picture; starts and goals are drawn from its free space."""
 
     file: str
     """The map's YAML file (looked for beside the scenario, too), or the name of a packaged map."""
@@ -202,7 +202,7 @@ class Scenario(_Strict):
     limit_s: Positive = Setting.limit_s
     """Simulated time after which the run ends; it ends earlier when all have arrived or collided [s]."""
     substeps: Annotated[int, Field(ge=1, le=1000)] = Setting.substeps
-    """Steps of motion and contact between two scans."""
+    """Steps of motion and contact between two scans; more are taken where these leave the arc driven by 0.1 mm."""
     record_scans: Literal["auto", "yes", "no"] = "auto"
     """Keep scans for the replay page; ``auto`` leaves them out where they would be huge."""
     judge_sides: bool = False

@@ -59,7 +59,7 @@ def cast_static(world: World, x: float, y: float, yaw: float, beams: Beams, out:
     """Fill ``out`` (M,) with the ranges [m] to the static world from pose x, y [m], yaw [rad], world frame.
 
     ``inf`` where nothing is within ``range_max``. From inside a circle or polygon the range is to its far
-    surface; from inside a solid grid cell it is 0.
+    surface; from inside a solid grid cell it is 0. In a wall, where no robot can be, it is to whatever lies beyond.
     """
     for n in range(out.shape[0]):
         out[n] = math.inf
@@ -210,6 +210,8 @@ def _cast_segments(
             ax, ay = cos_yaw * dx + sin_yaw * dy, cos_yaw * dy - sin_yaw * dx
             dx, dy = segments[i, 2] - x, segments[i, 3] - y
             bx, by = cos_yaw * dx + sin_yaw * dy, cos_yaw * dy - sin_yaw * dx
+            if world.one_sided[i] and ax * by - ay * bx >= 0.0:
+                continue
             if 0.25 * ((ax + bx) * (ax + bx) + (ay + by) * (ay + by)) <= reach * reach:
                 _cast_segment(ax, ay, bx, by, beams, out)
 

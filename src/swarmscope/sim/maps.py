@@ -57,6 +57,15 @@ def load_map(yaml_path: str | Path) -> Grid:
     return _as_grid(path, ~free[::-1], resolution, origin)
 
 
+def closed(grid: Grid) -> Grid:
+    """Return the map, with a ring of solid cells round it where it is free up to its edge: beyond is unknown."""
+    solid = solid_from_grid(grid)
+    if solid[[0, -1]].all() and solid[:, [0, -1]].all():
+        return grid
+    (x, y), cell = grid.origin, grid.resolution
+    return grid_from_solid(np.pad(solid, 1, constant_values=1), cell, (x - cell, y - cell))
+
+
 def save_map(grid: Grid, yaml_path: str | Path) -> None:
     """Write ``grid`` as a map_server YAML file and a PGM image of the same name beside it."""
     path = Path(yaml_path)

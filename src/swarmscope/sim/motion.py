@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from swarmscope._jit import jit, jit_inner
+from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.geometry import point_segment_distance, wrap_angle
 from swarmscope.onboard.control.unicycle import ramp
 from swarmscope.onboard.reasons import ARRIVED
@@ -14,6 +14,8 @@ from swarmscope.sim.state import Sim
 
 LOOK = 0.5
 """Clearances are measured up to this [m]."""
+NEAR = 0.05
+"""Clearances below this [m] are measured along every piece of a path."""
 
 
 @jit
@@ -64,8 +66,8 @@ def _meet_static(sim: Sim, i: int) -> None:
     limit = sim.radius + LOOK
     robot["clearance"] = static_clearance(sim.world, path[0, 0], path[0, 1], path[steps, 0], path[steps, 1], limit)
     robot["clearance"] -= sim.radius
-    if robot["crashed"] or robot["clearance"] > 0.05:
-        return  # the path strays less than 0.05 m from its chord within one tick
+    if robot["crashed"] or _chord_tells(sim, i, robot["clearance"]):
+        return
     best = math.inf
     for k in range(steps):
         c = static_clearance(sim.world, path[k, 0], path[k, 1], path[k + 1, 0], path[k + 1, 1], limit) - sim.radius
@@ -74,6 +76,24 @@ def _meet_static(sim: Sim, i: int) -> None:
             _stop_at(sim, i, k)
             break
     robot["clearance"] = best
+
+
+@jit_inner
+def _chord_tells(sim: Sim, i: int, clearance: float) -> bool:
+    """Tell whether the clearance of the straight line from start to end of robot i's path stands for the path's own.
+
+    It does where it is at least `NEAR` and four times what the path strays from that line: less than a quarter is lost.
+    """
+    path, steps = sim.path[i], sim.clock.substeps
+    if not clearance > NEAR:
+        return False
+    if clearance > 2.0 * sim.v_max * sim.clock.dt:  # nothing strays farther than half of its way
+        return True
+    ax, ay, bx, by = path[0, 0], path[0, 1], path[steps, 0], path[steps, 1]
+    for k in range(1, steps):
+        if 4.0 * point_segment_distance(path[k, 0], path[k, 1], ax, ay, bx, by) > clearance:
+            return False
+    return True
 
 
 @jit_inner
@@ -90,8 +110,7 @@ def _stop_at(sim: Sim, i: int, k: int) -> None:
 def judge(sim: Sim, tick: int) -> None:
     """Find contacts between robots within this tick, then note lengths, waits and arrivals."""
     steps = sim.clock.substeps
-    for i in range(sim.robots.size):
-        _meet_robots(sim, i)
+    _meet_robots(sim)
     for i in range(sim.robots.size):
         robot, path = sim.robots[i], sim.path[i]
         robot["min_clearance"] = min(robot["min_clearance"], robot["clearance"])
@@ -111,33 +130,60 @@ def judge(sim: Sim, tick: int) -> None:
 
 
 @jit_inner
-def _meet_robots(sim: Sim, i: int) -> None:
-    """Check robot i's path against every near robot with a larger number, both moving."""
-    robot, path = sim.robots[i], sim.path[i]
+def _meet_robots(sim: Sim) -> None:
+    """Measure the gaps between all robots that are near one another, all moving; stop those that touch."""
     steps = sim.clock.substeps
-    reach = 2.0 * sim.radius + LOOK + sim.v_max * sim.clock.dt
+    touched = False
+    for i in range(sim.robots.size):
+        touched = _gaps_of(sim, i, 0, steps, False) or touched
+    if not touched:
+        return
+    for k in range(steps):  # in the order of time: who has been stopped is not where it would have been
+        for i in range(sim.robots.size):
+            _gaps_of(sim, i, k, k + 1, True)
+    for i in range(sim.robots.size):
+        _gaps_of(sim, i, 0, steps, False)
+
+
+@jit
+def _gaps_of(sim: Sim, i: int, first: int, stop: int, halt: bool) -> bool:
+    """Measure robot i's gaps to near robots with larger numbers within pieces first .. stop - 1 of their paths.
+
+    Return whether one touches that still moves; ``halt`` stops both, else the gap of such a pair is not noted.
+    """
+    x, y = sim.path[i, 0, 0], sim.path[i, 0, 1]
+    reach = 2.0 * sim.radius + LOOK + 2.0 * sim.v_max * sim.clock.dt  # both drive
     columns = int(sim.cell_layout[2])
-    x, y = path[0, 0], path[0, 1]
+    touched = False
     for row in range(row_of(sim, y - reach), row_of(sim, y + reach) + 1):
         begin = sim.cell_start[row * columns + column_of(sim, x - reach)]
         end = sim.cell_start[row * columns + column_of(sim, x + reach) + 1]
         for c in range(begin, end):
             j = sim.cell_items[c]
-            if j <= i:
+            dx, dy = sim.path[j, 0, 0] - x, sim.path[j, 0, 1] - y
+            if j <= i or dx * dx + dy * dy >= reach * reach:
                 continue
-            other = sim.path[j]
-            dx, dy = other[0, 0] - x, other[0, 1] - y
-            if dx * dx + dy * dy >= reach * reach:
-                continue
-            best = math.inf
-            for k in range(steps):
-                ax, ay = other[k, 0] - path[k, 0], other[k, 1] - path[k, 1]
-                bx, by = other[k + 1, 0] - path[k + 1, 0], other[k + 1, 1] - path[k + 1, 1]
-                best = min(best, point_segment_distance(0.0, 0.0, ax, ay, bx, by))
-                if best <= 2.0 * sim.radius:
-                    _stop_at(sim, i, k)
-                    _stop_at(sim, j, k)
-                    break
-            gap = best - 2.0 * sim.radius
-            robot["clearance"] = min(robot["clearance"], gap)
+            gap = _gap(sim, i, j, first, stop)
+            if gap <= 0.0 and not (sim.robots[i]["crashed"] and sim.robots[j]["crashed"]):
+                touched = True
+                if not halt:
+                    continue
+                _stop_at(sim, i, first)
+                _stop_at(sim, j, first)
+            sim.robots[i]["clearance"] = min(sim.robots[i]["clearance"], gap)
             sim.robots[j]["clearance"] = min(sim.robots[j]["clearance"], gap)
+    return touched
+
+
+@jit_inline
+def _gap(sim: Sim, i: int, j: int, first: int, stop: int) -> float:
+    """Return the smallest gap [m] between robots i and j within these pieces, or the first that is none."""
+    path, other = sim.path[i], sim.path[j]
+    best = math.inf
+    for k in range(first, stop):
+        ax, ay = other[k, 0] - path[k, 0], other[k, 1] - path[k, 1]
+        bx, by = other[k + 1, 0] - path[k + 1, 0], other[k + 1, 1] - path[k + 1, 1]
+        best = min(best, point_segment_distance(0.0, 0.0, ax, ay, bx, by))
+        if best <= 2.0 * sim.radius:
+            break
+    return best - 2.0 * sim.radius

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -101,6 +102,21 @@ class Clock(NamedTuple):
     seed: int
     dt: float
     substeps: int
+    """Straight pieces of a robot's path within ``dt``; `new_sim` takes more where `ARC_M` asks for them."""
+
+
+ARC_M = 1e-4
+"""How far the path of a robot, in straight pieces, may lie beside the arc that it stands for [m]."""
+MOST_SUBSTEPS = 1000
+
+
+def enough_substeps(clock: Clock, v_max: float, w_max: float) -> int:
+    """Return how many straight pieces make the path of a tick: those asked for, or as many as keep it within `ARC_M`.
+
+    An arc driven at v and w for h seconds rises v w h^2 / 8 above its chord.
+    """
+    needed = math.ceil(clock.dt * math.sqrt(v_max * w_max / (8.0 * ARC_M)) - 1e-9)
+    return max(clock.substeps, min(needed, MOST_SUBSTEPS))
 
 
 class Records(NamedTuple):
@@ -190,6 +206,7 @@ def new_sim(
     robots["clearance"] = np.inf
     swarm = new_swarm(n, rig)
     swarm.percepts["dt_s"] = clock.dt
+    clock = clock._replace(substeps=enough_substeps(clock, rig.body.v_max_mps, rig.body.w_max_radps))
     columns = max(1, int(np.ceil((bounds[2] - bounds[0]) / CELL_M)))
     rows = max(1, int(np.ceil((bounds[3] - bounds[1]) / CELL_M)))
     sim = Sim(

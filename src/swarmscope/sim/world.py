@@ -1,7 +1,8 @@
 """The static world: its validated description (`WorldSpec`) and the plain arrays the kernels read (`World`).
 
 All lengths are metres in the world frame (x right, y up on a drawing; REP-103). Obstacles may overlap and may
-lie outside ``bounds``; ``bounds`` is what is drawn and where tasks put robots, it is not a wall.
+lie outside ``bounds``; ``bounds`` is what is drawn and where tasks put robots, it is not a wall. A wall is `WALL_M`
+thick with round ends and corners, so that a LiDAR sees from every side what a robot can touch.
 """
 
 from __future__ import annotations
@@ -18,6 +19,10 @@ from swarmscope._jit import jit, jit_inline
 
 PIECE_M = 1.0
 """Walls and polygon edges are cut into pieces no longer than this [m]: a look-up finds them by midpoint."""
+
+WALL_M = 0.02
+"""Thickness of a wall [m], for sensors, contacts, ways and pictures alike: what is within half of it of the wall's line
+is solid. It is what the robots' guard takes for the narrowest thing there is (``Guarding.thinnest_m``)."""
 
 BIN_M = 1.0
 """Side of a look-up bin [m]; larger only in worlds wider than `BINS_PER_SIDE` of them."""
@@ -76,7 +81,7 @@ class Polygon(_Model):
 
 
 class Wall(_Model):
-    """A wall without thickness along the polyline ``points`` [[x, y], ...] [m], at least 2."""
+    """A wall, 0.02 m thick, along the polyline ``points`` [[x, y], ...] [m], at least 2."""
 
     type: Literal["wall"] = "wall"
     """What it is."""
@@ -133,7 +138,7 @@ class WorldSpec(_Model):
     obstacles: list[Obstacle] = Field(default_factory=list)
     """Circles, convex polygons, walls, and at most one occupancy grid; each names its ``type``."""
     bounds: tuple[Number, Number, Number, Number]
-    """Lower left and upper right corner of the world: x0, y0, x1, y1 [m]."""
+    """Lower left and upper right corner of what is drawn, no walls: x0, y0, x1, y1 [m]."""
 
     @model_validator(mode="after")
     def _check_world(self) -> Self:
@@ -171,13 +176,15 @@ class World(NamedTuple):
     """The static world as plain arrays for kernels; always the same dtypes, any of them may be empty."""
 
     circles: Floats
-    """(C, 3) x, y, radius [m], in bin order."""
+    """(C, 3) x, y, radius [m], in bin order: discs, and the round ends and corners of walls."""
     radius_max: float
     """Largest radius of a circle [m], 0 without circles."""
     segments: Floats
-    """(S, 4) ax, ay, bx, by [m], none longer than `PIECE_M`, in bin order."""
+    """(S, 4) ax, ay, bx, by [m], none longer than `PIECE_M`, in bin order: sides of walls, edges of polygons."""
+    one_sided: Bytes
+    """(S,) 1 = side of a wall, seen from its right only: from anywhere else another part of the wall is before it."""
     vertices: Floats
-    """(V, 2) corners of the convex polygons, counter-clockwise [m]."""
+    """(V, 2) corners of walls and of the convex polygons, counter-clockwise [m]."""
     vertex_start: Ints
     """(P + 1,) first corner of each polygon."""
     bins: Bins
@@ -193,9 +200,12 @@ class World(NamedTuple):
 
 def compile_world(spec: WorldSpec) -> World:
     """Turn the description into arrays and look-up bins for the kernels."""
-    circles = _circle_rows(spec)
-    polygons = [_corners(obstacle) for obstacle in spec.obstacles if isinstance(obstacle, Polygon)]
-    segments = _segment_rows(spec, polygons)
+    walls = [np.asarray(o.points, dtype=np.float64) for o in spec.obstacles if isinstance(o, Wall)]
+    circles = np.concatenate([_circle_rows(spec), *map(_joints, walls)])
+    bars = [bar for wall in walls for a, b in pairwise(wall) for bar in _bars(a, b)]
+    solids = [_corners(obstacle) for obstacle in spec.obstacles if isinstance(obstacle, Polygon)]
+    segments = _segment_rows(bars, solids)
+    polygons = bars + solids
     x0, y0, size, columns, rows = _bin_layout(spec, circles, segments)
 
     def bin_of(points: Floats) -> Ints:
@@ -212,6 +222,7 @@ def compile_world(spec: WorldSpec) -> World:
         circles=np.ascontiguousarray(circles[circle_order]),
         radius_max=float(circles[:, 2].max(initial=0.0)),
         segments=np.ascontiguousarray(segments[segment_order]),
+        one_sided=(segment_order < 2 * len(bars)).astype(np.uint8),
         vertices=np.ascontiguousarray(np.concatenate([np.zeros((0, 2)), *polygons])),
         vertex_start=np.cumsum([0, *(len(p) for p in polygons)], dtype=np.int64),
         bins=Bins(x0, y0, size, columns, rows, circle_start, segment_start, polygon_start, polygon_items),
@@ -290,12 +301,28 @@ def _circle_rows(spec: WorldSpec) -> Floats:
     return np.asarray(rows, dtype=np.float64).reshape(-1, 3)
 
 
-def _segment_rows(spec: WorldSpec, polygons: list[Floats]) -> Floats:
-    """Return walls and polygon edges (S, 4), cut into pieces that share their end points exactly."""
-    lines = [np.asarray(o.points, dtype=np.float64) for o in spec.obstacles if isinstance(o, Wall)]
-    lines += [np.vstack([p, p[:1]]) for p in polygons]
-    pieces = [_cut(a, b) for line in lines for a, b in pairwise(line)]
-    return np.concatenate([np.zeros((0, 4)), *pieces])
+def _joints(wall: Floats) -> Floats:
+    """Return the discs (n, 3) that round the ends and corners of a wall (n, 2)."""
+    return np.column_stack([wall, np.full(len(wall), 0.5 * WALL_M)])
+
+
+def _bars(a: Floats, b: Floats) -> list[Floats]:
+    """Return the boxes, each as 4 corners counter-clockwise, between the joints at both ends of one straight wall.
+
+    The sides 0-1 and 2-3 lie along the wall, and neighbours share their corners exactly.
+    """
+    aside = 0.5 * WALL_M * (np.array([a[1] - b[1], b[0] - a[0]]) / math.dist(a, b))
+    return [np.array([p - aside, q - aside, q + aside, p + aside]) for p, q in _cut(a, b).reshape(-1, 2, 2)]
+
+
+def _segment_rows(bars: list[Floats], solids: list[Floats]) -> Floats:
+    """Return the long sides of walls, then the edges of polygons (S, 4), in pieces that share their ends exactly.
+
+    The short sides of a wall's boxes lie within the wall.
+    """
+    sides = [np.hstack([bar[::2], bar[1::2]]) for bar in bars]
+    edges = [_cut(a, b) for p in solids for a, b in pairwise(np.vstack([p, p[:1]]))]
+    return np.concatenate([np.zeros((0, 4)), *sides, *edges])
 
 
 def _cut(a: Floats, b: Floats) -> Floats:

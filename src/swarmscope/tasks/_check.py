@@ -3,12 +3,13 @@ scenarios."""
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swarmscope.errors import UnsolvableWorldError
+from swarmscope.errors import ConfigError, UnsolvableWorldError
 from swarmscope.sim.contact import static_clearance
 from swarmscope.sim.world import World, compile_world
 from swarmscope.tasks._contract import Setup, check_robots
@@ -24,6 +25,10 @@ from swarmscope.tasks._occupancy import (
 
 CLEARANCE_M = 0.05  # room beyond the robot's radius that a way must leave
 RESOLUTION_M = 0.05
+FINE_M = 0.02  # the same where a scenario asks for more room, and robots need all of it
+WOBBLE_M = 0.01  # that a robot in a passage is off its middle
+TOLERANCE_M = 1e-9  # of rounded coordinates
+ARRIVE_M = 0.05  # distance to the goal at which robots have arrived whose planner says nothing else
 LARGEST_GRID_CELLS = 150_000_000  # worlds beyond this are checked on a grid coarse enough to stay below
 
 Floats = NDArray[np.float64]
@@ -39,13 +44,50 @@ class Reach(NamedTuple):
     resolution: float = RESOLUTION_M
 
 
-def check_setup(setup: Setup, radius: float) -> None:
+class Keeping(NamedTuple):
+    """What keeps a scenario's robots off things [m], by the keys of the scenario."""
+
+    clearance_m: float = 0.0
+    footprint_clearance_m: float = 0.0
+    range_min_m: float = 0.0
+
+    def distance(self, radius: float) -> tuple[float, str]:
+        """Return how near the centre of a robot of ``radius`` [m] comes to things [m], and the key behind it."""
+        return max(
+            (radius + self.clearance_m, "guard.clearance_m"),
+            (radius + self.footprint_clearance_m, "guard.footprint_clearance_m"),
+            (self.range_min_m, "lidar.range_min_m"),
+        )
+
+    def spacing(self, radius: float) -> tuple[float, str]:
+        """Return how near to each other robots of ``radius`` [m] park in a row [m], and the key behind it."""
+        return max(
+            (2.0 * (radius + self.clearance_m), "guard.clearance_m"),
+            (2.0 * (radius + self.footprint_clearance_m), "guard.footprint_clearance_m"),
+            (radius + self.range_min_m, "lidar.range_min_m"),
+        )
+
+
+def check_setup(setup: Setup, radius: float, keeping: Keeping | None = None) -> None:
     """Raise an UnsolvableWorldError that names the robot and the reason, unless all can start and arrive.
 
     Checked, in this order: finite numbers; robots of ``radius`` [m] that overlap at the start or at the
     goals; starts and goals closer than ``radius`` to an obstacle; goals that cannot be reached with 0.05 m
-    to spare.
+    to spare; and what a scenario's robots keep besides, if it is given (`check_keeping`).
     """
+    check_places(setup, radius, keeping)
+    bad = unreachable(setup, Reach(radius))
+    if bad.size:
+        raise UnsolvableWorldError(
+            f"robot {int(bad[0])}: no way from its start to its goal for a robot of radius {radius:g} m "
+            f"(searched with {CLEARANCE_M:g} m to spare on a {RESOLUTION_M:g} m grid)"
+        )
+    if keeping is not None:
+        check_keeping(setup, radius, keeping)
+
+
+def check_places(setup: Setup, radius: float, keeping: Keeping | None = None) -> None:
+    """Raise an UnsolvableWorldError unless every robot can stand at its start and at its goal, as in `check_setup`."""
     check_robots(len(setup.starts), radius)
     starts, goals = np.asarray(setup.starts, dtype=np.float64), np.asarray(setup.goals, dtype=np.float64)
     if starts.ndim != 2 or starts.shape[1] != 3 or goals.shape != (len(starts), 2):
@@ -58,12 +100,49 @@ def check_setup(setup: Setup, radius: float) -> None:
     _check_apart("goal", goals, radius)
     world = compile_world(setup.world)
     _check_free("start", world, starts[:, :2], radius)
-    _check_free("goal", world, goals, radius)
-    bad = unreachable(setup, Reach(radius))
+    enough = "" if keeping is None else f"; {keeping.distance(radius)[0]:g} m would do"
+    _check_free("goal", world, goals, radius, enough)
+
+
+def check_keeping(setup: Setup, radius: float, keeping: Keeping) -> None:
+    """Raise a ConfigError that names the key, unless robots that keep so far off things get to their goals.
+
+    Of a setup that `check_setup` has passed. A robot that starts at its goal need not go there.
+    """
+    moves = np.hypot(*(setup.goals - setup.starts[:, :2]).T) > ARRIVE_M
+    distance, key = keeping.distance(radius)
+    world = compile_world(setup.world)
+    for robot in np.flatnonzero(moves).tolist():
+        x, y = setup.goals[robot].tolist()
+        free = static_clearance(world, x, y, x, y, 2.0 * distance)
+        if free < distance - TOLERANCE_M:
+            raise ConfigError(
+                key,
+                f"robot {robot} cannot arrive: its goal ({x:.3f}, {y:.3f}) is {free:.3f} m from an obstacle, "
+                f"and with this value {distance:g} m would do",
+            )
+    _check_parking(setup.goals, moves, *keeping.spacing(radius))
+    if distance + WOBBLE_M <= radius + CLEARANCE_M:
+        return
+    bad = unreachable(setup, Reach(radius, distance + WOBBLE_M - radius, FINE_M))
+    bad = bad[moves[bad]]
     if bad.size:
-        raise UnsolvableWorldError(
-            f"robot {int(bad[0])}: no way from its start to its goal for a robot of radius {radius:g} m "
-            f"(searched with {CLEARANCE_M:g} m to spare on a {RESOLUTION_M:g} m grid)"
+        narrowest = 2.0 * (distance + WOBBLE_M + math.sqrt(0.5) * FINE_M)
+        raise ConfigError(
+            key,
+            f"robot {int(bad[0])} has no way from its start to its goal: with this value robots pass through what is "
+            f"{narrowest:.2f} m wide or wider",
+        )
+
+
+def _check_parking(goals: Floats, moves: NDArray[np.bool_], least: float, key: str) -> None:
+    close = _closest(goals, least - TOLERANCE_M, moves)
+    if close is not None:
+        one, other, gap = close
+        raise ConfigError(
+            key,
+            f"robots {one} and {other} cannot both arrive for certain: their goals are {gap:.3f} m apart, "
+            f"and with this value {least:g} m would do",
         )
 
 
@@ -111,24 +190,34 @@ def _check_finite(what: str, points: Floats) -> None:
 
 
 def _check_apart(what: str, points: Floats, radius: float) -> None:
-    """Look at each point's neighbours in bins of side 2 radius."""
+    close = _closest(points, 2.0 * radius, np.ones(len(points), dtype=np.bool_))
+    if close is not None:
+        one, other, gap = close
+        raise UnsolvableWorldError(
+            f"robots {one} and {other}: their {what}s are {gap:.3f} m apart, less than two radii ({2.0 * radius:g} m)"
+        )
+
+
+def _closest(points: Floats, least: float, moves: NDArray[np.bool_]) -> tuple[int, int, float] | None:
+    """Return the first two robots with points closer than ``least`` [m] of which one ``moves``, and the distance.
+
+    Neighbours are in bins of that side.
+    """
     bins: dict[tuple[int, int], list[int]] = {}
-    for robot, (column, row) in enumerate(np.floor(points / (2.0 * radius)).astype(np.int64).tolist()):
+    for robot, (column, row) in enumerate(np.floor(points / least).astype(np.int64).tolist()):
         for near in ((column + i, row + j) for i in (-1, 0, 1) for j in (-1, 0, 1)):
             for other in bins.get(near, []):
                 gap = float(np.hypot(*(points[robot] - points[other])))
-                if gap < 2.0 * radius:
-                    raise UnsolvableWorldError(
-                        f"robots {other} and {robot}: their {what}s are {gap:.3f} m apart, "
-                        f"less than two radii ({2.0 * radius:g} m)"
-                    )
+                if gap < least and (moves[robot] or moves[other]):
+                    return other, robot, gap
         bins.setdefault((column, row), []).append(robot)
+    return None
 
 
-def _check_free(what: str, world: World, points: Floats, radius: float) -> None:
+def _check_free(what: str, world: World, points: Floats, radius: float, enough: str = "") -> None:
     for robot, (x, y) in enumerate(points.tolist()):
         if static_clearance(world, x, y, x, y, 2.0 * radius) <= radius:
             raise UnsolvableWorldError(
                 f"robot {robot}: its {what} ({x:.3f}, {y:.3f}) is in an obstacle or closer to one "
-                f"than its radius ({radius:g} m)"
+                f"than its radius ({radius:g} m){enough}"
             )

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from swarmscope._jit import jit_alloc as jit
 from swarmscope.errors import ConfigError, UnsolvableWorldError
 from swarmscope.sim.world import Circle, Obstacle, Polygon, WorldSpec
-from swarmscope.tasks._check import Reach, unreachable
+from swarmscope.tasks._check import Reach, check_places, unreachable
 from swarmscope.tasks._contract import Density, Length, Setup
 from swarmscope.tasks._rocks import Rocks, draw_rocks
 
@@ -120,9 +120,11 @@ def yaw_toward(x: Floats, y: Floats, goal_x: Floats, goal_y: Floats) -> Floats:
     return np.arctan2(goal_y - y, goal_x - x)
 
 
-def open_field(places: Places) -> Setup:
+def open_field(places: Places, radius: float) -> Setup:
     """Return the places without any trees."""
-    return Setup(WorldSpec(obstacles=[], bounds=_bounds(places)), places.starts, places.goals)
+    setup = Setup(WorldSpec(obstacles=[], bounds=_bounds(places)), places.starts, places.goals)
+    check_places(setup, radius)
+    return setup
 
 
 def plant(seed: int, places: Places, radius: float, options: ForestOptions) -> Setup:
@@ -147,6 +149,7 @@ def plant(seed: int, places: Places, radius: float, options: ForestOptions) -> S
         setup = Setup(world, places.starts, places.goals)
         bad = unreachable(setup, reach)
         if bad.size == 0:
+            check_places(setup, radius)
             return setup
         why = f"robot {int(bad[0])} cannot reach its goal"
     raise UnsolvableWorldError(

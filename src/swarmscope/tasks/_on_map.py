@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from swarmscope.errors import UnsolvableWorldError
 from swarmscope.sim.world import WorldSpec, compile_world
-from swarmscope.tasks._check import CLEARANCE_M, RESOLUTION_M
+from swarmscope.tasks._check import CLEARANCE_M, RESOLUTION_M, check_places
 from swarmscope.tasks._contract import Setup, check_robots
 from swarmscope.tasks._occupancy import Raster, cells_of, centres_of, components, largest_label, rasterise
 from swarmscope.tasks._search import Searcher
@@ -23,26 +23,29 @@ Ints = NDArray[np.int64]
 def place_on_map(spec: WorldSpec, seed: int, robots: int, radius: float, min_distance: float) -> Setup:
     """Return random starts and goals in the largest connected free part of the map, inside its bounds.
 
-    Starts are at least 4 ``radius`` apart from one another, and so are goals; every goal is at least
-    ``min_distance`` [m] from its start along the shortest 8-connected path. Each robot starts with its
-    heading toward its goal.
+    Starts are at least 4 ``radius`` apart from one another, more for the smallest robots, and so are goals; every
+    goal is at least ``min_distance`` [m] from its start along the shortest 8-connected path. Each robot starts
+    with its heading toward its goal.
     """
     check_robots(robots, radius)
     raster = rasterise(compile_world(spec), radius + CLEARANCE_M, spec.bounds, RESOLUTION_M)
     free = _largest_part(raster)
-    starts = _Scatter(raster, free, 4.0 * radius, np.random.default_rng([seed, STARTS]))
-    goals = _Scatter(raster, free, 4.0 * radius, np.random.default_rng([seed, GOALS]))
+    apart = max(4.0 * radius, 2.0 * (radius + CLEARANCE_M))
+    starts = _Scatter(raster, free, apart, np.random.default_rng([seed, STARTS]))
+    goals = _Scatter(raster, free, apart, np.random.default_rng([seed, GOALS]))
     searcher = Searcher(raster)
     for robot in range(robots):
         start = starts.draw()
         if start is None:
-            raise UnsolvableWorldError(f"robot {robot}: no room for its start, 4 radii from the other starts")
+            raise UnsolvableWorldError(f"robot {robot}: no room for its start, {apart:g} m from the other starts")
         starts.take(start)
         goals.take(_goal_for(robot, start, goals, searcher, min_distance))
     start_points, goal_points = np.array(starts.taken), np.array(goals.taken)
     ahead = goal_points - start_points
     yaw = np.arctan2(ahead[:, 1], ahead[:, 0])
-    return Setup(spec, np.column_stack([start_points, yaw]), goal_points)
+    setup = Setup(spec, np.column_stack([start_points, yaw]), goal_points)
+    check_places(setup, radius)
+    return setup
 
 
 def _largest_part(raster: Raster) -> Ints:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from swarmscope.errors import ConfigError, UnsolvableWorldError
 from swarmscope.sim.world import Circle, Obstacle, WorldSpec
-from swarmscope.tasks._check import Reach, check_setup, pass_each_other
+from swarmscope.tasks._check import Reach, check_places, pass_each_other
 from swarmscope.tasks._contract import Amount, Density, Length, Option, Setup, check_robots, read_options
 from swarmscope.tasks._forest import MARGIN_M, ROOM_M, smallest_spacing
 from swarmscope.tasks._rocks import draw_rocks
@@ -84,7 +84,7 @@ def make(seed: int, robots: int = 5, radius: float = 0.43, **options: Option) ->
             continue
         fits = True
         if pass_each_other(setup, Reach(radius, chosen.spare_m)):
-            check_setup(setup, radius)
+            check_places(setup, radius)
             return setup
     if not fits:
         raise ConfigError(f"task {NAME}: density", f"things of {chosen.density:g} per m^2 do not fit into the room")

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarmscope.sim.world import WorldSpec, compile_world
-from swarmscope.tasks._check import CLEARANCE_M, RESOLUTION_M
+from swarmscope.tasks._check import CLEARANCE_M, RESOLUTION_M, check_places
 from swarmscope.tasks._contract import Option, Setup, check_robots, read_options
-from swarmscope.tasks._forest import yaw_toward
+from swarmscope.tasks._forest import smallest_spacing, yaw_toward
 from swarmscope.tasks._giwt_maps import MapOptions, check_counts, draw_map, unsolvable
 from swarmscope.tasks._occupancy import centres_of, components, labels_at, rasterise
 
@@ -23,7 +23,7 @@ NAME = "GIWT_1"
 SUMMARY = "GIWT's task I: random starts and goals on a random map; by default robot 0 moves, the others stand"
 
 FREE_M = 0.25  # from a start or goal to an obstacle, beyond the robot's radius
-APART_M = 1.0  # between two robots
+APART_M = 1.0  # between two robots; wider ones keep as far apart as in a line
 CROWD = 40
 """With more robots the map grows."""
 DRAWS = 50
@@ -57,7 +57,9 @@ def make(seed: int, robots: int = 15, radius: float = 0.15, **options: Option) -
         if chosen.moves == "one":
             goals = np.vstack([goals[:1], points[1:]])
         yaw = yaw_toward(points[:, 0], points[:, 1], goals[:, 0], goals[:, 1])
-        return Setup(world, np.column_stack([points, yaw]), goals)
+        setup = Setup(world, np.column_stack([points, yaw]), goals)
+        check_places(setup, radius)
+        return setup
     raise unsolvable(NAME, seed, DRAWS, f"{robots} robots do not fit")
 
 
@@ -73,9 +75,9 @@ def scatter(
 ) -> tuple[Floats, Floats] | None:
     """Return starts and goals (N, 2) [m] in one connected part of the free space, or None where they do not fit.
 
-    All starts and goals keep APART_M off each other, and each goal lies at least ``apart_m`` from its start.
+    All starts and goals keep APART_M or more off each other, and each goal lies at least ``apart_m`` from its start.
     """
-    size = options.size_m
+    size, apart = options.size_m, max(APART_M, smallest_spacing(radius))
     reach = rasterise(compile_world(world), radius + CLEARANCE_M, (0.0, 0.0, size, size), RESOLUTION_M)
     room = rasterise(compile_world(world), radius + FREE_M, (0.0, 0.0, size, size), RESOLUTION_M)
     cells = np.argwhere(room.blocked == 0)
@@ -85,12 +87,12 @@ def scatter(
     labels = labels_at(components(reach), picked)
     part = np.bincount(labels[labels >= 0]).argmax()  # the part with most room
     points = centres_of(reach, picked[labels == part])
-    starts = _apart(points, robots)
+    starts = _apart(points, robots, apart)
     if len(starts) < robots:
         return None
     taken, goals = starts, np.zeros((0, 2))
     for start in starts:
-        fits = apart_from(points, taken) & (np.hypot(*(points - start).T) >= options.apart_m)
+        fits = apart_from(points, taken, apart) & (np.hypot(*(points - start).T) >= options.apart_m)
         if not fits.any():
             return None
         goal = points[rng.choice(np.flatnonzero(fits))]
@@ -98,19 +100,19 @@ def scatter(
     return starts, goals
 
 
-def _apart(points: Floats, count: int) -> Floats:
-    """Return the first ``count`` points that keep APART_M off each other, fewer if there are not so many."""
+def _apart(points: Floats, count: int, apart: float) -> Floats:
+    """Return the first ``count`` points that keep ``apart`` [m] off each other, fewer if there are not so many."""
     taken = np.zeros((0, 2))
     for point in points:
         if len(taken) == count:
             break
-        if apart_from(point[None], taken)[0]:
+        if apart_from(point[None], taken, apart)[0]:
             taken = np.vstack([taken, point])
     return taken
 
 
-def apart_from(points: Floats, taken: Floats) -> NDArray[np.bool_]:
-    """Tell which points (N, 2) keep APART_M off all points of ``taken (K, 2)``."""
-    apart = points[:, None, :] - taken[None, :, :]
-    return np.asarray((np.hypot(apart[..., 0], apart[..., 1]) >= APART_M).all(axis=1))
+def apart_from(points: Floats, taken: Floats, apart: float = APART_M) -> NDArray[np.bool_]:
+    """Tell which points (N, 2) keep ``apart`` [m] off all points of ``taken (K, 2)``."""
+    between = points[:, None, :] - taken[None, :, :]
+    return np.asarray((np.hypot(between[..., 0], between[..., 1]) >= apart).all(axis=1))
 

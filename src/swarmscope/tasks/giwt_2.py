@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from swarmscope.tasks._check import Reach, unreachable
+from swarmscope.tasks._check import Reach, check_places, unreachable
 from swarmscope.tasks._contract import Option, Setup, check_robots, read_options
 from swarmscope.tasks._giwt_maps import MapOptions, check_counts, draw_map, unsolvable
 
@@ -31,6 +31,7 @@ def make(seed: int, robots: int = 15, radius: float = 0.15, **options: Option) -
         world = draw_map(rng, chosen, np.vstack([starts[:, :2], goals]), radius + FREE_M)
         setup = Setup(world, starts, goals)
         if unreachable(setup, Reach(radius)).size == 0:
+            check_places(setup, radius)
             return setup
     raise unsolvable(NAME, seed, DRAWS, "somebody cannot reach its goal")
 

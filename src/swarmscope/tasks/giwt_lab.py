@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from swarmscope.sim.world import WorldSpec
-from swarmscope.tasks._check import Reach, unreachable
+from swarmscope.tasks._check import Reach, check_places, unreachable
 from swarmscope.tasks._contract import Amount, Length, Option, Setup, check_robots, read_options
 from swarmscope.tasks._forest import smallest_spacing
 from swarmscope.tasks._giwt_maps import Kind, Sizes, check_counts, draw_obstacles, unsolvable
@@ -60,5 +60,6 @@ def make(seed: int, robots: int = 5, radius: float = 0.15, **options: Option) ->
         things = draw_obstacles(rng, chosen.obstacles, counts, sizes, keep_free, radius + FREE_M)
         setup = Setup(WorldSpec(obstacles=[*walls, *things], bounds=bounds), starts, goals)
         if unreachable(setup, Reach(radius)).size == 0:
+            check_places(setup, radius)
             return setup
     raise unsolvable(NAME, seed, DRAWS, "somebody cannot reach its goal")

@@ -25,4 +25,4 @@ def make(seed: int, robots: int = 15, radius: float = 0.15, **options: Option) -
     """Return a ring of robots; ``seed`` changes nothing, nothing is random here."""
     check_robots(robots, radius)
     chosen = read_options(OPTIONS, options, NAME)
-    return open_field(rings(robots, radius, chosen.size_m))
+    return open_field(rings(robots, radius, chosen.size_m), radius)

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from swarmscope.sim.world import WALL_M
 from swarmscope.viewing.run_data import (
     Array,
     RunData,
@@ -80,6 +81,7 @@ def page_data(run: RunData) -> dict[str, Any]:
         "robots": [robot.model_dump() for robot in run.world.robots],
         "obstacles": [obstacle.model_dump() for obstacle in run.world.obstacles],
         "bounds": run.world.bounds,
+        "wall_m": WALL_M,
         "state_names": [str(name) for name in trajectory.state_names],
         "reason_names": [str(name) for name in trajectory.reason_names],
         "range_max_m": float(trajectory.range_max_m),
