@@ -7,6 +7,7 @@ reason. ``tick`` never raises, never compiles and never waits. Every field, unit
 from __future__ import annotations
 
 import math
+import secrets
 from collections import Counter
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -14,8 +15,10 @@ from typing import Any, NamedTuple
 
 from swarmscope.onboard.body import Body
 from swarmscope.onboard.data_sheets import (
+    BOOTS,
     check_address,
     check_body,
+    check_boot,
     check_rate,
     options_of,
     planner_of,
@@ -76,11 +79,12 @@ class Robot:
     """A planner at work on a robot with ``body`` and ``lidar`` and the radio ``address`` (0 to 65535).
 
     ``planner`` is a name, a FILE.py, or what ``load_planner`` returned; ``rate_hz`` says how often ``tick`` is called;
+    ``boot`` is the number of its first start, for runs that shall be repeated; None draws one at every start.
     ``params`` are the planner's (docs/planners.md); ``options`` are fields of ``rig.Guarding, Safety, Sharing`` (safe
     directions, guard, packets). Raises ConfigError with the field's name, UnknownNameError, MissingExtraError.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913  what a robot is, by name
         self,
         planner: str | Planner,
         body: Body,
@@ -89,6 +93,7 @@ class Robot:
         address: int,
         rate_hz: float = 5.0,
         params: Mapping[str, float] | None = None,
+        boot: int | None = None,
         **options: float,
     ) -> None:
         self._planner = planner_of(planner)
@@ -97,6 +102,7 @@ class Robot:
         self.params = self._planner.params(params)
         self._options = options_of(options)
         self._period_s = 1.0 / self.rate_hz
+        self._next_boot = check_boot(boot)
         self.faults: Counter[str] = Counter()
         """How often what could not be used."""
         self.seen: list[Seen] = []
@@ -105,7 +111,8 @@ class Robot:
         self.reset()
 
     def reset(self) -> None:
-        """Forget everything but the counts of faults: as after switching on."""
+        """Forget everything but the counts of faults: as after switching on. Others know it by a new boot number."""
+        self.boot = self._draw_boot()
         self._scans, self.rows = self._set_up()
         self._mail = Mail()
         self._trail = Trail((STALE_PERIODS + JUMP_PERIODS) * self._period_s, self._period_s)
@@ -113,6 +120,13 @@ class Robot:
         self._ahead_s = 0.0
         self._driven: Pose = (0.0, 0.0, 0.0)
         self.seen = []
+
+    def _draw_boot(self) -> int:
+        """Return the boot number of this start."""
+        if self._next_boot is None:
+            return secrets.randbelow(BOOTS)
+        boot, self._next_boot = self._next_boot, (self._next_boot + 1) % BOOTS
+        return boot
 
     def warm_up(self, say: Callable[[str], None] | None = None) -> WarmUp:
         """Compile or load the kernels and networks that ``tick`` needs; ``say`` is told what it did."""
@@ -168,7 +182,7 @@ class Robot:
         clearance = float(self._options["clearance_m"])
         scans = Scans(self.lidar, self._period_s, self.body.radius_m + clearance)
         rig = rig_of(self.body, self.lidar, scans, self._options)
-        return scans, Rows(self._planner, rig, self.params, self.address)
+        return scans, Rows(self._planner, rig, self.params, self.address, self.boot)
 
     def _take_time_and_motion(self, now_s: Any, moved: Any) -> None:
         """Take in clock and odometry; raises Unusable."""
