@@ -106,6 +106,8 @@ SHARED = np.dtype(
         ("trial_seq", np.int32, SENDERS),
         ("quota_s", np.float64, SENDERS),  # since when its answers are counted
         ("quota_n", np.int32, SENDERS),  # how many it got since
+        ("strangers_s", np.float64),  # the same for all together that are not in sight
+        ("strangers_n", np.int64),
         # requests sent and requests to answer
         ("seq", np.int64),
         ("asked_seq", np.int64),  # sequence number of our last request round, -1 = none
@@ -138,6 +140,6 @@ def new_shared(robots: int) -> np.ndarray:
     shared = np.zeros(robots, SHARED)
     for name in ("track_id", "heard_id", "sender_id", "window_boot", "trial_boot", "asked_seq", "asked_id"):
         shared[name] = -1
-    for name in ("asked_s", "window_s", "quota_s"):
+    for name in ("asked_s", "window_s", "quota_s", "strangers_s"):
         shared[name] = NEVER_S
     return shared

@@ -75,7 +75,7 @@ def step(robot):
     assert d["side"] in (-1, 0, 1)
     assert 0 <= d["n_out"] <= MAX_OUTBOX
     for k in range(d["n_out"]):
-        assert decode(d["out"][k], int(d["out_length"][k]), np.zeros(5, np.int64)) == OK
+        assert decode(d["out"][k], int(d["out_length"][k]), np.zeros(6, np.int64)) == OK
     for p in (d["p_self"], d["p_left"]):
         assert np.isnan(p) or 0.0 <= p <= 1.0
     return robot

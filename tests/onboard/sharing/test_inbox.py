@@ -26,7 +26,7 @@ from packets import (
     rows_of,
     sent,
 )
-from swarmscope.onboard.percept import MAX_INBOX, MAX_OUTBOX, PEERS
+from swarmscope.onboard.percept import MAX_INBOX, MAX_OUTBOX, PEERS, SHARED
 from swarmscope.onboard.sharing.inbox import (
     OWN_ROOM,
     answer_all,
@@ -274,6 +274,7 @@ def test_wild_counts_are_clamped(wild):
     assert after == before
 
 
+GUARDED = [name for name in SHARED.names if name.startswith("track_")] + ["x", "y", "compass", "started"]
 packets = st.one_of(
     st.binary(max_size=MAX_PACKET_BYTES),
     st.builds(request, st.integers(0, 65535), st.integers(0, 65535), st.integers(0, 65535)),
@@ -299,8 +300,10 @@ def test_any_packets_in_any_order_leave_the_tables_whole(ticks):
         start_round(see)
         ask(see, 5)
         ask(see, 6)
+        guarded = [see.shared[name].tobytes() for name in GUARDED]
         read_inbox(see)
         row = see.shared
+        assert [row[name].tobytes() for name in GUARDED] == guarded  # no packet moves what the guard looks at
         seen += len(inbox)
         assert 0 <= row["ask_n"] <= PEERS
         assert 0 <= row["answers_n"] <= row["asked_n"] == 2

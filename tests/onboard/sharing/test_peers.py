@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from packets import asked, dropped, features, read, request, rows_of
 from swarmscope.onboard.percept import SENDERS
-from swarmscope.onboard.sharing.peers import ANSWERS_PER_S, FORGET_S, QUIET_S
+from swarmscope.onboard.sharing.peers import ANSWERS_PER_S, FORGET_S, QUIET_S, STRANGERS_PER_S
 
 
 class Listener:
@@ -167,6 +167,22 @@ def test_the_share_of_one_sender_is_counted_anew_every_second():
     assert taken[:ANSWERS_PER_S] == [1] * ANSWERS_PER_S
     listener.rows.percept["now_s"] += 1.0
     assert listener.takes(request(2, 101, boot=7)) == 1
+
+
+def test_made_up_addresses_share_what_is_not_for_those_in_sight():
+    """Eight strangers a tick: 16 answers a second for all of them, and the neighbour gets its own."""
+    rows = rows_of()
+    rows.shared["track_id"][0] = 2
+    answered, own = 0, 0
+    for k in range(25):
+        rows.percept["now_s"] += 0.2
+        forged = [request(1000 + 7 * k + j, 1) for j in range(7)]
+        row = read(rows, *forged, request(2, k + 1, boot=7))
+        asking = row["ask_id"][: row["ask_n"]].tolist()
+        own += 2 in asking
+        answered += len([who for who in asking if who != 2])
+    assert own == 25
+    assert answered == 5 * STRANGERS_PER_S
 
 
 @settings(deadline=None, max_examples=50)

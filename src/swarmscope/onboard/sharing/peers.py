@@ -25,8 +25,12 @@ SURE = 64
 """An answer to our present request counts as many packets when it is decided which window stays."""
 MOST = 60_000
 """Packets of a window are counted up to here."""
+SECOND = 1.0 - 1e-6
+"""A second, so that ten ticks of 0.1 s are one [s]."""
 ANSWERS_PER_S = 5
 """Requests of one sender that are answered in a second."""
+STRANGERS_PER_S = 16
+"""Requests of all together that are not in sight: addresses can be made up, and an answer is longer than a request."""
 
 
 @jit
@@ -81,13 +85,17 @@ def note_answer(see: View, header: np.ndarray) -> None:
 def may_answer(see: View, p: int) -> bool:
     """Tell whether the sender in slot ``p`` gets one more answer in this second, and count it."""
     shared, now = see.shared, see.percept["now_s"]
-    if now - shared["quota_s"][p] >= 1.0:
+    if now - shared["quota_s"][p] >= SECOND:
         shared["quota_s"][p], shared["quota_n"][p] = now, 0
+    if now - shared["strangers_s"] >= SECOND:
+        shared["strangers_s"], shared["strangers_n"] = now, 0
+    stranger = not _in_sight(shared, shared["sender_id"][p])
+    if shared["quota_n"][p] >= ANSWERS_PER_S or (stranger and shared["strangers_n"] >= STRANGERS_PER_S):
+        return False
     shared["quota_n"][p] += 1
-    if shared["quota_n"][p] <= ANSWERS_PER_S:
-        return True
-    shared["quota_n"][p] = ANSWERS_PER_S
-    return False
+    if stranger:
+        shared["strangers_n"] += 1
+    return True
 
 
 @jit_inner
