@@ -62,7 +62,7 @@ def test_it_does_what_the_simulators_robots_do(name):
     world = world_of(Circle(center=(0.0, 0.0), radius=0.5), Circle(center=(-1.2, 0.6), radius=0.2))
     sim, swarm = place_sim(starts, goals, world)
     memory = planner.new_memory(4)
-    robots = [new_robot(name, address=i) for i in range(4)]
+    robots = [new_robot(name, address=i, boot=boot) for i, boot in enumerate(sim.percepts["boot"].tolist())]
     index_robots(sim)
     packets = 0
     for tick in range(60):
@@ -483,7 +483,7 @@ def test_the_example_runs():
     example = Path(__file__).resolve().parents[2] / "examples" / "robot.py"
     done = subprocess.run([sys.executable, str(example)], capture_output=True, text=True, check=True, timeout=600)
     lines = done.stdout.splitlines()
-    assert any(line.endswith("3 -> 7: 7 bytes") for line in lines)
+    assert any(line.endswith("3 -> 7: 9 bytes") for line in lines)
     assert any("7 -> 3: " in line for line in lines)
     assert any(line.endswith("chose a side with the neighbours' features") for line in lines)
     assert lines[-1].startswith("both arrived after ")
