@@ -31,7 +31,7 @@ def planner_of(planner: str | Planner) -> Planner:
     return chosen
 
 
-def options_of(given: Mapping[str, float]) -> dict[str, Any]:
+def options_of(given: Mapping[str, float | None]) -> dict[str, Any]:
     """Return every option as a plain number; raises ConfigError or UnknownNameError."""
     checked = dict(DEFAULTS)
     for name, value in given.items():

@@ -7,7 +7,7 @@ reason. ``tick`` never raises, never compiles and never waits. Every field, unit
 from __future__ import annotations
 
 import math
-import secrets
+import os
 from collections import Counter
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -79,12 +79,12 @@ class Robot:
     """A planner at work on a robot with ``body`` and ``lidar`` and the radio ``address`` (0 to 65535).
 
     ``planner`` is a name, a FILE.py, or what ``load_planner`` returned; ``rate_hz`` says how often ``tick`` is called;
-    ``boot`` is the number of its first start, for runs that shall be repeated; None draws one at every start.
     ``params`` are the planner's (docs/planners.md); ``options`` are fields of ``rig.Guarding, Safety, Sharing`` (safe
-    directions, guard, packets). Raises ConfigError with the field's name, UnknownNameError, MissingExtraError.
+    directions, guard, packets), and ``boot``, the boot number of the first start, for runs that shall be repeated;
+    without it every start draws one. Raises ConfigError with the field's name, UnknownNameError, MissingExtraError.
     """
 
-    def __init__(  # noqa: PLR0913  what a robot is, by name
+    def __init__(
         self,
         planner: str | Planner,
         body: Body,
@@ -93,16 +93,15 @@ class Robot:
         address: int,
         rate_hz: float = 5.0,
         params: Mapping[str, float] | None = None,
-        boot: int | None = None,
-        **options: float,
+        **options: float | None,
     ) -> None:
         self._planner = planner_of(planner)
         self.body, self.lidar = check_body(body), check_lidar(lidar)
         self.address, self.rate_hz = check_address(address), check_rate(rate_hz)
         self.params = self._planner.params(params)
+        self._next_boot = check_boot(options.pop("boot", None))
         self._options = options_of(options)
         self._period_s = 1.0 / self.rate_hz
-        self._next_boot = check_boot(boot)
         self.faults: Counter[str] = Counter()
         """How often what could not be used."""
         self.seen: list[Seen] = []
@@ -124,7 +123,7 @@ class Robot:
     def _draw_boot(self) -> int:
         """Return the boot number of this start."""
         if self._next_boot is None:
-            return secrets.randbelow(BOOTS)
+            return int.from_bytes(os.urandom(2), "little")
         boot, self._next_boot = self._next_boot, (self._next_boot + 1) % BOOTS
         return boot
 
