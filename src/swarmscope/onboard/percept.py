@@ -50,7 +50,7 @@ PERCEPT = np.dtype(
 )
 PEERS = 10
 """Neighbours that are remembered at once."""
-SENDERS = 32
+SENDERS = 20
 """Senders whose sequence numbers are remembered at once."""
 
 DECISION = np.dtype(
@@ -101,13 +101,12 @@ SHARED = np.dtype(
         ("window_boot", np.int32, (SENDERS, 2)),  # -1 = there is none
         ("window_seq", np.int32, (SENDERS, 2)),  # its newest number
         ("window_seen", np.uint64, (SENDERS, 2)),
-        ("window_n", np.int32, (SENDERS, 2)),  # packets that came in it
+        ("window_n", np.int16, (SENDERS, 2)),  # packets that came in it
         ("trial_boot", np.int32, SENDERS),  # -1 = nothing is on probation
         ("trial_seq", np.int32, SENDERS),
-        ("quota_s", np.float64, SENDERS),  # since when its answers are counted
-        ("quota_n", np.int32, SENDERS),  # how many it got since
-        ("strangers_s", np.float64),  # the same for all together that are not in sight
-        ("strangers_n", np.int64),
+        ("quota_n", np.int8, SENDERS),  # answers that it gets in this second
+        ("quota_s", np.float64),  # when that began
+        ("strangers_n", np.int64),  # the same for all together that are not in sight
         # requests sent and requests to answer
         ("seq", np.int64),
         ("asked_seq", np.int64),  # sequence number of our last request round, -1 = none
@@ -140,6 +139,6 @@ def new_shared(robots: int) -> np.ndarray:
     shared = np.zeros(robots, SHARED)
     for name in ("track_id", "heard_id", "sender_id", "window_boot", "trial_boot", "asked_seq", "asked_id"):
         shared[name] = -1
-    for name in ("asked_s", "window_s", "quota_s", "strangers_s"):
+    for name in ("asked_s", "window_s", "quota_s"):
         shared[name] = NEVER_S
     return shared

@@ -23,7 +23,7 @@ FORGET_S = 30.0
 """A window without a packet for so long gives way to a new one, however much came in it [s]."""
 SURE = 64
 """An answer to our present request counts as many packets when it is decided which window stays."""
-MOST = 60_000
+MOST = 30_000
 """Packets of a window are counted up to here."""
 SECOND = 1.0 - 1e-6
 """A second, so that ten ticks of 0.1 s are one [s]."""
@@ -85,10 +85,10 @@ def note_answer(see: View, header: np.ndarray) -> None:
 def may_answer(see: View, p: int) -> bool:
     """Tell whether the sender in slot ``p`` gets one more answer in this second, and count it."""
     shared, now = see.shared, see.percept["now_s"]
-    if now - shared["quota_s"][p] >= SECOND:
-        shared["quota_s"][p], shared["quota_n"][p] = now, 0
-    if now - shared["strangers_s"] >= SECOND:
-        shared["strangers_s"], shared["strangers_n"] = now, 0
+    if now - shared["quota_s"] >= SECOND:
+        shared["quota_s"], shared["strangers_n"] = now, 0
+        for q in range(SENDERS):
+            shared["quota_n"][q] = 0
     stranger = not _in_sight(shared, shared["sender_id"][p])
     if shared["quota_n"][p] >= ANSWERS_PER_S or (stranger and shared["strangers_n"] >= STRANGERS_PER_S):
         return False
@@ -119,7 +119,7 @@ def _slot_of(shared: Row, sender: int) -> int:
         free = max(0, oldest)  # SENDERS > PEERS: somebody is out of sight
     shared["sender_id"][free] = sender
     shared["trial_boot"][free] = -1
-    shared["quota_s"][free], shared["quota_n"][free] = NEVER_S, 0
+    shared["quota_n"][free] = 0
     for w in range(2):
         shared["window_s"][free, w], shared["window_boot"][free, w], shared["window_n"][free, w] = NEVER_S, -1, 0
     return free
