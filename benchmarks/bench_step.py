@@ -63,7 +63,7 @@ def prepared(robots: int, rig: Rig) -> Swarm:
             angles = np.sort(rng.uniform(0.0, 2.0 * np.pi, 10))
             distances = rng.uniform(0.8, 5.0, 10)
             percepts["packet_length"][i, k] = encode_features(
-                Head(100 + k, 1, 7), angles, distances, 10, 5.0, percepts["packet"][i, k]
+                Head(100 + k, 0, 1, 7), angles, distances, 10, 5.0, percepts["packet"][i, k]
             )
     return swarm
 

@@ -214,7 +214,7 @@ def scan() -> plt.Figure:
     loop = np.append(at, at[0] + 2 * math.pi)
     ax.plot(loop, np.append(distance, distance[0]), color=ORANGE, lw=1.0, ls="--")
     ax.plot(at, distance, "o", color=ORANGE, ms=6, label="features")
-    ax.set_title(f"what is sent: {at.size} features\n{10 + 2 * at.size} bytes", fontsize=10.5)
+    ax.set_title(f"what is sent: {at.size} features\n{12 + 2 * at.size} bytes", fontsize=10.5)
     handles = {}
     for ax in axes:
         handles |= {label: handle for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)}

@@ -10,6 +10,7 @@ from pathlib import Path
 import swarmscope
 from swarmscope.onboard.percept import MAX_INBOX, MAX_OUTBOX
 from swarmscope.onboard.planners import planner_names
+from swarmscope.onboard.sharing.message import REQUEST_BYTES
 from swarmscope.scenarios.keys import MUST, Key, planner_keys, scenario_keys, task_keys
 from swarmscope.sim.state import QUEUE, Radio
 from swarmscope.tasks import task_names
@@ -42,7 +43,7 @@ RADIO = """## What the radio does with packets
 Everything that a robot sends goes through its one radio of `radio.bitrate_bps`: the *bandwidth limit* of a run.
 
 - A packet of n bytes is on the air for 8 (n + {overhead}) / `radio.bitrate_bps` seconds: {overhead} bytes are the
-  link's preamble, header and checksum. A request of 7 bytes takes {request:.1f} ms by default, 26 bytes of features
+  link's preamble, header and checksum. A request of 9 bytes takes {request:.1f} ms by default, 28 bytes of features
   {features:.1f} ms. All this time sender *and* receiver are occupied; other pairs are not.
 - It begins when both are free. A packet that would have to wait longer than `max_wait_s` = {wait:g} s does not fit: it
   is dropped before it is sent, and counted in `packets_crowded_out` of `metrics.json`, not in `messages` and not in
@@ -88,8 +89,8 @@ def page() -> str:
         queue=QUEUE,
         inbox=MAX_INBOX,
         outbox=MAX_OUTBOX,
-        request=8e3 * (7 + link.overhead_bytes) / link.bitrate_bps,
-        features=8e3 * (26 + link.overhead_bytes) / link.bitrate_bps,
+        request=8e3 * (REQUEST_BYTES + link.overhead_bytes) / link.bitrate_bps,
+        features=8e3 * (28 + link.overhead_bytes) / link.bitrate_bps,
     )
     parts = [HEAD, "## Keys\n", table(scenario_keys()), radio, formulas()]
     parts += ["## Options of the tasks\n\nSet with `task.options.NAME`; what tasks are for: [tasks.md](tasks.md).\n"]

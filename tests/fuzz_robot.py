@@ -80,12 +80,12 @@ class Inputs:
     def _packets(self) -> list[bytes]:
         rng, out, packets = self.rng, np.zeros(MAX_PACKET_BYTES, np.uint8), []
         for _ in range(rng.choice([0, 1, 3, 9, 60])):
-            sender, seq, reply = (int(v) for v in rng.integers(0, [8, 40, 12]))
+            head = tuple(int(v) for v in rng.integers(0, [8, 3, 40, 12]))
             angles, distances = rng.uniform(-9.0, 9.0, 16), rng.uniform(-1.0, 40.0, 16)
             n = int(rng.integers(0, 17))
             kind = int(rng.integers(0, 7))
             if kind < 5:
-                length = _write(kind, (sender, seq, reply), angles, distances[:n], self.lidar.range_m, out)
+                length = _write(kind, head, angles, distances[:n], self.lidar.range_m, out)
                 packets.append(out[:length].tobytes())
             else:
                 packets.append(rng.bytes(int(rng.integers(0, 150))))
@@ -119,14 +119,14 @@ class Inputs:
         return values
 
 
-def _write(kind: int, head: tuple[int, int, int], angles: Any, distances: Any, reach: float, out: Any) -> int:
+def _write(kind: int, head: tuple[int, int, int, int], angles: Any, distances: Any, reach: float, out: Any) -> int:
     """Write a packet of ``kind``; return its length."""
     answer = Head(*head)
     n = len(distances)
     if kind == 0:
-        return int(encode_request(answer.sender, answer.seq, out))
+        return int(encode_request(answer, out))
     if kind == 1:
-        return int(encode_directed_request(answer.sender, answer.seq, float(angles[0]), out))
+        return int(encode_directed_request(answer, float(angles[0]), out))
     if kind == 2:
         return int(encode_features(answer, angles, distances, n, reach, out))
     if kind == 3:
@@ -150,7 +150,7 @@ def fuzz(name: str, ticks: int, seed: int) -> tuple[int, float]:
     """Run ``ticks`` ticks of a planner on every kind of robot; return how many drove, and ticks per second."""
     drove, begun, done = 0, time.perf_counter(), 0
     for k, (body, lidar) in enumerate(ROBOTS):
-        robot, inputs = Robot(name, body, lidar, address=k), Inputs(seed + 1000 * k, lidar, body)
+        robot, inputs = Robot(name, body, lidar, address=k, boot=0), Inputs(seed + 1000 * k, lidar, body)
         robot.warm_up()
         begun += time.perf_counter() - begun if k == 0 else 0.0
         for _ in range(math.ceil(ticks / len(ROBOTS))):

@@ -46,8 +46,8 @@ def test_every_real_scan_is_perceived(real):
     assert seen.safe.shape == seen.filtered_m.shape == (scans, beams)
     assert len(seen.features) == len(seen.packet_bytes) == len(seen.us) == scans
     assert 0.2 < seen.safe.mean() < 0.95
-    assert np.array_equal(seen.packet_bytes, [10 + 2 * len(pairs) for pairs in seen.features])
-    assert seen.packet_bytes.mean() <= 32.0
+    assert np.array_equal(seen.packet_bytes, [12 + 2 * len(pairs) for pairs in seen.features])
+    assert seen.packet_bytes.mean() <= 34.0
     assert np.all(seen.us > 0.0)
     assert not seen.rig.sensor.wraps and seen.rig.sensor.range_max == 5.0
 

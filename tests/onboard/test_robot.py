@@ -27,12 +27,13 @@ from robots import (
     wall_ahead,
     within,
 )
+from swarmscope.errors import ConfigError
 from swarmscope.onboard.body import Body
 from swarmscope.onboard.lidar import Lidar
 from swarmscope.onboard.percept import MAX_INBOX, MAX_NEIGHBOURS
 from swarmscope.onboard.planners import load_planner, planner_names
 from swarmscope.onboard.robot import Robot, Seen
-from swarmscope.onboard.sharing.message import encode_request
+from swarmscope.onboard.sharing.message import MAX_PACKET_BYTES, OK, Head, decode, encode_request
 from swarmscope.sim.cells import index_robots
 from swarmscope.sim.motion import judge, move
 from swarmscope.sim.radio import exchange
@@ -62,7 +63,7 @@ def test_it_does_what_the_simulators_robots_do(name):
     world = world_of(Circle(center=(0.0, 0.0), radius=0.5), Circle(center=(-1.2, 0.6), radius=0.2))
     sim, swarm = place_sim(starts, goals, world)
     memory = planner.new_memory(4)
-    robots = [new_robot(name, address=i) for i in range(4)]
+    robots = [new_robot(name, address=i, boot=boot) for i, boot in enumerate(sim.percepts["boot"].tolist())]
     index_robots(sim)
     packets = 0
     for tick in range(60):
@@ -277,7 +278,7 @@ def test_the_same_scan_again_is_no_new_one():
 
 
 def test_two_robots_ask_answer_and_fuse():
-    """One in front of an obstacle, one beside it: a request of 7 bytes, an answer of 10 + 2 n, and a fused choice."""
+    """One in front of an obstacle, one beside it: a request of 9 bytes, an answer of 12 + 2 n, and a fused choice."""
     world, rig = world_of(Circle(center=(2.2, 0.05), radius=0.5), Circle(center=(0.5, -2.0), radius=0.3)), rig_of()
     a, b = Driver(new_robot(address=1), goal=(0.0, 6.0)), Driver(new_robot(address=2), goal=(0.0, 0.0))
     to_a, lengths, fused, x = [], [], [], 0.0
@@ -300,8 +301,8 @@ def test_two_robots_ask_answer_and_fuse():
         lengths += [len(packet) for packet in to_a]
         if a.robot.rows.decision["fused"]:
             fused.append((int(a.robot.rows.decision["heard"]), command.reason))
-    assert 7 in lengths
-    assert any(length >= 12 and length % 2 == 0 for length in lengths)
+    assert 9 in lengths
+    assert any(length >= 14 and length % 2 == 0 for length in lengths)
     assert (1, "obstacle ahead: chose a side with the neighbours' features") in fused
     assert not a.robot.faults
     assert not b.robot.faults
@@ -309,10 +310,10 @@ def test_two_robots_ask_answer_and_fuse():
 
 def test_more_packets_than_a_tick_takes_wait_for_the_next():
     driver = Driver()
-    out = np.zeros(138, np.uint8)
+    out = np.zeros(MAX_PACKET_BYTES, np.uint8)
     requests = []
     for sender in range(100, 112):
-        length = encode_request(sender, 1, out)
+        length = encode_request(Head(sender, 0, 1, 0), out)
         requests.append(out[:length].tobytes())
     first, second = driver.tick(inbox=requests), driver.tick()
     assert [to for to, _ in first.outbox] == list(range(100, 100 + MAX_INBOX))
@@ -322,12 +323,12 @@ def test_more_packets_than_a_tick_takes_wait_for_the_next():
 
 def test_an_outbox_can_be_handed_over_as_it_is():
     driver = Driver()
-    out = np.zeros(138, np.uint8)
-    length = encode_request(9, 1, out)
+    out = np.zeros(MAX_PACKET_BYTES, np.uint8)
+    length = encode_request(Head(9, 0, 1, 0), out)
     assert driver.tick(inbox=[(7, out[:length].tobytes())]).outbox[0][0] == 9
-    length = encode_request(9, 2, out)
+    length = encode_request(Head(9, 0, 2, 0), out)
     assert driver.tick(inbox=[out[:length]]).outbox[0][0] == 9
-    length = encode_request(9, 3, out)
+    length = encode_request(Head(9, 0, 3, 0), out)
     assert driver.tick(inbox=[bytearray(out[:length].tobytes())]).outbox[0][0] == 9
 
 
@@ -359,7 +360,7 @@ def test_a_warm_robot_never_compiles(name):
         driver.tick(
             scan, goal=(np.float32(0.1), 5), heading=1, speed=np.float64(0.2), moved=[0.01, 0, np.float32(0.1)],
             neighbours=[Seen(np.int64(3), 1, np.float32(0.5), speed=1, radius_m=0.3), (4, 2.0, 0.0)],
-            inbox=[b"", rng.bytes(7), bytearray(10), memoryview(bytes(42)), np.zeros(138, np.uint8)],
+            inbox=[b"", rng.bytes(7), bytearray(10), memoryview(bytes(42)), np.zeros(MAX_PACKET_BYTES, np.uint8)],
         )  # fmt: skip
     assert signatures() == before
     assert robot.faults["scan"] == 2
@@ -412,6 +413,41 @@ def test_a_reset_robot_is_as_new():
         assert again.tick(box_left()) == fresh.tick(box_left())
 
 
+def test_every_start_has_a_boot_number_of_its_own():
+    drawn = {new_robot().boot for _ in range(8)}
+    assert len(drawn) > 1  # all alike: one in 2 ** 112
+    assert all(0 <= boot < 65536 for boot in drawn)
+    robot = new_robot(boot=65535)
+    assert (robot.boot, int(robot.rows.percept["boot"])) == (65535, 65535)
+    robot.reset()
+    assert (robot.boot, int(robot.rows.percept["boot"])) == (0, 0)
+
+
+@pytest.mark.parametrize("boot", [-1, 65536, 1.5, math.nan])
+def test_an_impossible_boot_number_is_refused(boot):
+    with pytest.raises(ConfigError, match="boot"):
+        new_robot(boot=boot)
+
+
+def test_a_robot_that_restarts_is_heard_and_hears_again():
+    """Both counters begin anew; what was under way before the restart is dropped."""
+    driver = Driver(new_robot(address=1, boot=7))
+    out = np.zeros(MAX_PACKET_BYTES, np.uint8)
+
+    def answered(boot, seq):
+        packet = out[: encode_request(Head(9, boot, seq, 0), out)].tobytes()
+        return [to for to, _ in driver.tick(inbox=[packet]).outbox] == [9]
+
+    assert all(answered(3, seq) for seq in range(100, 110))
+    assert [answered(4, seq) for seq in range(1, 6)] == [False, True, True, True, True]
+    driver.robot.reset()
+    assert [answered(4, seq) for seq in range(6, 9)] == [True, True, True]
+    reply = driver.tick(inbox=[out[: encode_request(Head(9, 4, 9, 0), out)].tobytes()]).outbox[0][1]
+    header = np.zeros(6, np.int64)
+    assert decode(np.frombuffer(reply, np.uint8).copy(), len(reply), header) == OK
+    assert (header[1], header[3], header[5]) == (1, 4 ^ 9, 8)
+
+
 def test_the_zero_of_the_clock_does_not_matter():
     plain, unix = Driver(), Driver()
     unix.k = int(1.7e9 / DT)
@@ -448,7 +484,7 @@ def test_the_example_runs():
     example = Path(__file__).resolve().parents[2] / "examples" / "robot.py"
     done = subprocess.run([sys.executable, str(example)], capture_output=True, text=True, check=True, timeout=600)
     lines = done.stdout.splitlines()
-    assert any(line.endswith("3 -> 7: 7 bytes") for line in lines)
+    assert any(line.endswith("3 -> 7: 9 bytes") for line in lines)
     assert any("7 -> 3: " in line for line in lines)
     assert any(line.endswith("chose a side with the neighbours' features") for line in lines)
     assert lines[-1].startswith("both arrived after ")

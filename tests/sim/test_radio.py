@@ -11,8 +11,9 @@ from swarmscope.sim.cells import index_robots
 from swarmscope.sim.radio import exchange
 from swarmscope.sim.sensing import sense
 from swarmscope.sim.state import QUEUE, Radio
+from swarmscope.sim.streams import BOOT, boot_number
 
-REQUEST, FEATURES = 7, 26
+REQUEST, FEATURES = 9, 28
 
 
 def line(robots=2, gap=1.0, **radio):
@@ -24,7 +25,7 @@ def line(robots=2, gap=1.0, **radio):
 def content(i, k, length):
     """The bytes of packet k of robot i: short ones begin like requests, others like features."""
     kind = KIND_REQUEST if length == REQUEST else KIND_FEATURES
-    return [0x10 | kind, *((10 * i + k + np.arange(1, length)) % 256).tolist()]
+    return [0x20 | kind, *((10 * i + k + np.arange(1, length)) % 256).tolist()]
 
 
 def post(sim, i, *packets):
@@ -73,14 +74,48 @@ def test_bytes_on_the_air_are_counted_apart_from_the_payload():
     assert counters(sim, 1, "sent", "bytes", "air_bytes") == [0, 0, 0]
 
 
-@pytest.mark.parametrize(("kind", "length", "features"), [(KIND_DIRECTED_REQUEST, 8, 0), (KIND_LATENT, 138, 1)])
+@pytest.mark.parametrize(("kind", "length", "features"), [(KIND_DIRECTED_REQUEST, 10, 0), (KIND_LATENT, 140, 1)])
 def test_features_are_told_by_the_kind_of_packet(kind, length, features):
     sim = line(2)
     post(sim, 0, (1, length))
-    sim.decisions["out"][0, 0, 0] = 0x10 | kind
+    sim.decisions["out"][0, 0, 0] = 0x20 | kind
     exchange(sim, 0)
     assert counters(sim, 0, "bytes", "sent_features", "feature_bytes") == [length, features, features * length]
     assert sim.links_n[0] == features
+
+
+def plain_boot(seed, robot, boots):
+    """The same draw with Python's numbers."""
+    bits = 2**64 - 1
+
+    def mixed(z):
+        z = ((z ^ (z >> 30)) * 0xBF58476D1CE4E5B9) & bits
+        z = ((z ^ (z >> 27)) * 0x94D049BB133111EB) & bits
+        return z ^ (z >> 31)
+
+    step = 0x9E3779B97F4A7C15
+    k = mixed((seed + step) & bits)
+    for at, value in enumerate((robot, boots, BOOT), 1):
+        k = mixed((k + value * step + at) & bits)
+    return k >> 48
+
+
+def test_boot_numbers_are_drawn_from_seed_robot_and_starts():
+    for seed in (0, 5):
+        sim, _ = place_sim([(k, 0.0, 0.0) for k in range(6)], seed=seed)
+        assert sim.percepts["boot"].tolist() == [plain_boot(seed, k, 0) for k in range(6)]
+        assert len(set(sim.percepts["boot"].tolist())) == 6
+    assert boot_number(5, 3, 2) == plain_boot(5, 3, 2) != boot_number(5, 3, 1)
+
+
+@pytest.mark.parametrize("length", [-1, 0, 141, 2**62])
+def test_packets_of_no_possible_length_are_not_sent(length):
+    sim = line()
+    post(sim, 0, (1, REQUEST))
+    sim.decisions["out_length"][0, 0] = length
+    sim.decisions["n_out"][0] = 1000
+    exchange(sim, 0)
+    assert counters(sim, 0, "sent", "bytes") == [0, 0]
 
 
 def test_beyond_the_range_nothing_arrives():
@@ -131,12 +166,12 @@ def test_the_given_share_is_lost_and_the_same_for_the_same_seed(loss):
 
 
 def test_packets_of_one_tick_share_the_channel():
-    """At 8 kbit/s and 30 bytes on the air a packet takes 30 ms: five last 150 ms, in their order."""
+    """At 8 kbit/s and 32 bytes on the air a packet takes 32 ms: five last 160 ms, in their order."""
     sim = line(2, bitrate_bps=8000.0, overhead_bytes=23, latency_s=0.0)
     post(sim, 0, *[(1, REQUEST)] * 5)
     exchange(sim, 0)
-    assert sim.queue_due[1, :5] == pytest.approx(0.03 * np.arange(1, 6))
-    assert float(sim.robots[1]["radio_free_s"]) == pytest.approx(0.15)
+    assert sim.queue_due[1, :5] == pytest.approx(0.032 * np.arange(1, 6))
+    assert float(sim.robots[1]["radio_free_s"]) == pytest.approx(0.16)
 
 
 def test_a_receiver_that_listens_to_one_keeps_the_other_waiting():
@@ -144,12 +179,12 @@ def test_a_receiver_that_listens_to_one_keeps_the_other_waiting():
     post(sim, 0, (2, REQUEST))
     post(sim, 1, (2, REQUEST))
     exchange(sim, 0)
-    assert sim.queue_due[2, :2] == pytest.approx([0.03, 0.06])
+    assert sim.queue_due[2, :2] == pytest.approx([0.032, 0.064])
 
 
 def test_a_packet_that_would_wait_too_long_is_dropped_and_counted():
     sim = line(2, bitrate_bps=800.0, overhead_bytes=23, max_wait_s=0.5)
-    post(sim, 0, *[(1, REQUEST)] * 5)  # 0.3 s each
+    post(sim, 0, *[(1, REQUEST)] * 5)  # 0.32 s each
     exchange(sim, 0)
     assert counters(sim, 0, "sent", "crowded") == [2, 3]
     assert counters(sim, 1, "queued") == [2]
@@ -172,4 +207,4 @@ def test_the_channel_is_free_again_later():
     for tick in range(3):
         post(sim, 0, (1, REQUEST))
         exchange(sim, 10 * tick)
-    assert sim.queue_due[1, :3] == pytest.approx(10 * DT * np.arange(3) + 0.03)
+    assert sim.queue_due[1, :3] == pytest.approx(10 * DT * np.arange(3) + 0.032)

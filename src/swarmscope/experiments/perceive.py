@@ -74,7 +74,7 @@ def perceive(log: ScanLog, range_m: float = 5.0, radius_m: float = 0.15, beam_st
         safe[k], filtered[k] = swarm.safe[0] == 1, swarm.filtered[0]
         angles, distances = swarm.own.angles[0, :count].copy(), swarm.own.distances[0, :count].copy()
         found.append(np.column_stack([(angles + np.pi) % (2 * np.pi) - np.pi, distances]))
-        sizes[k] = encode_features(Head(0, 0, 0), angles, distances, count, rig.sensor.range_max, packet)
+        sizes[k] = encode_features(Head(0, 0, 0, 0), angles, distances, count, rig.sensor.range_max, packet)
     directions = rig.sensor.angle_min + rig.sensor.increment * np.arange(beams)
     return Perception(rig, directions, ranges, safe, filtered, found, sizes, times)
 

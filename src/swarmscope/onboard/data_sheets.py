@@ -16,6 +16,8 @@ from swarmscope.onboard.scans import Scans
 
 DEFAULTS: dict[str, Any] = {**GUARDING._asdict(), **SAFETY._asdict(), **SHARING._asdict()}
 """Options of a robot, by the keys of a scenario."""
+BOOTS = 65536
+"""Boot numbers."""
 
 
 def planner_of(planner: str | Planner) -> Planner:
@@ -29,7 +31,7 @@ def planner_of(planner: str | Planner) -> Planner:
     return chosen
 
 
-def options_of(given: Mapping[str, float]) -> dict[str, Any]:
+def options_of(given: Mapping[str, float | None]) -> dict[str, Any]:
     """Return every option as a plain number; raises ConfigError or UnknownNameError."""
     checked = dict(DEFAULTS)
     for name, value in given.items():
@@ -61,6 +63,16 @@ def check_address(address: Any) -> int:
     value = finite(address, "address")
     if value != int(value) or not 0 <= value < ADDRESSES:
         raise ConfigError("address", f"must be a whole number from 0 to {ADDRESSES - 1}, not {address!r}")
+    return int(value)
+
+
+def check_boot(boot: Any) -> int | None:
+    """Return the boot number of a robot's first start, None if it is to be drawn; raises ConfigError."""
+    if boot is None:
+        return None
+    value = finite(boot, "boot")
+    if value != int(value) or not 0 <= value < BOOTS:
+        raise ConfigError("boot", f"must be a whole number from 0 to {BOOTS - 1}, not {boot!r}")
     return int(value)
 
 

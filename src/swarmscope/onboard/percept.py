@@ -22,6 +22,9 @@ MAX_INBOX = 8
 MAX_OUTBOX = 8
 """Packets a robot may send in one tick."""
 
+NEVER_S = -1e9
+"""Time of what has not happened [s]."""
+
 PERCEPT = np.dtype(
     [
         ("now_s", np.float64),  # the robot's own clock [s]
@@ -34,6 +37,7 @@ PERCEPT = np.dtype(
         ("odom_yaw", np.float64),  # [rad]
         ("compass", np.float64),  # own heading, compass frame [rad]
         ("id", np.int64),  # own radio address
+        ("boot", np.int64),  # drawn anew at every start, 0 to 65535
         ("n_neighbours", np.int64),
         ("neighbour_id", np.int64, MAX_NEIGHBOURS),
         ("neighbour_x", np.float64, MAX_NEIGHBOURS),  # body frame [m]
@@ -46,6 +50,8 @@ PERCEPT = np.dtype(
 )
 PEERS = 10
 """Neighbours that are remembered at once."""
+SENDERS = 20
+"""Senders whose sequence numbers are remembered at once."""
 
 DECISION = np.dtype(
     [
@@ -89,17 +95,29 @@ SHARED = np.dtype(
         ("heard_n", np.int64, PEERS),
         ("heard_angle", np.float32, (PEERS, MAX_FEATURES)),
         ("heard_distance", np.float32, (PEERS, MAX_FEATURES)),
-        ("last_seq_id", np.int64, PEERS),  # newest sequence number accepted of each sender
-        ("last_seq", np.int64, PEERS),
+        # what has come in of each sender (``sharing/peers.py``): two windows, a packet on probation, answers it got
+        ("sender_id", np.int32, SENDERS),  # -1 = free
+        ("window_s", np.float64, (SENDERS, 2)),  # when last a packet came in it, -1e9 = there is none
+        ("window_boot", np.int32, (SENDERS, 2)),  # -1 = there is none
+        ("window_seq", np.int32, (SENDERS, 2)),  # its newest number
+        ("window_seen", np.uint64, (SENDERS, 2)),
+        ("window_n", np.int16, (SENDERS, 2)),  # packets that came in it
+        ("trial_boot", np.int32, SENDERS),  # -1 = nothing is on probation
+        ("trial_seq", np.int32, SENDERS),
+        ("quota_n", np.int8, SENDERS),  # answers that it gets in this second
+        ("quota_s", np.float64),  # when that began
+        ("strangers_n", np.int64),  # the same for all together that are not in sight
         # requests sent and requests to answer
         ("seq", np.int64),
         ("asked_seq", np.int64),  # sequence number of our last request round, -1 = none
         ("asked_s", np.float64),
         ("asked_n", np.int64),  # how many were asked in that round
+        ("asked_id", np.int64, MAX_OUTBOX),  # who, the first ``asked_n`` of these
+        ("asked_done", np.uint8, MAX_OUTBOX),  # 1: has answered
         ("answers_n", np.int64),  # how many have answered
         ("ask_n", np.int64),
         ("ask_id", np.int64, PEERS),
-        ("ask_seq", np.int64, PEERS),
+        ("ask_name", np.int64, PEERS),  # what the answer calls the request (``message.name_of``)
         ("ask_direction", np.int16, PEERS),  # code of the direction that is asked about, -1 = none
         # this tick's packets with a network's features that answer our last round
         ("latent_n", np.uint8),
@@ -119,7 +137,8 @@ SHARED = np.dtype(
 def new_shared(robots: int) -> np.ndarray:
     """Return the empty shared memory of ``robots`` robots."""
     shared = np.zeros(robots, SHARED)
-    for name in ("track_id", "heard_id", "last_seq_id", "asked_seq"):
+    for name in ("track_id", "heard_id", "sender_id", "window_boot", "trial_boot", "asked_seq", "asked_id"):
         shared[name] = -1
-    shared["asked_s"] = -1e9
+    for name in ("asked_s", "window_s", "quota_s"):
+        shared[name] = NEVER_S
     return shared

@@ -7,6 +7,7 @@ reason. ``tick`` never raises, never compiles and never waits. Every field, unit
 from __future__ import annotations
 
 import math
+import os
 from collections import Counter
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -14,8 +15,10 @@ from typing import Any, NamedTuple
 
 from swarmscope.onboard.body import Body
 from swarmscope.onboard.data_sheets import (
+    BOOTS,
     check_address,
     check_body,
+    check_boot,
     check_horizon,
     check_rate,
     options_of,
@@ -78,7 +81,8 @@ class Robot:
 
     ``planner`` is a name, a FILE.py, or what ``load_planner`` returned; ``rate_hz`` says how often ``tick`` is called;
     ``params`` are the planner's (docs/planners.md); ``options`` are fields of ``rig.Guarding, Safety, Sharing`` (safe
-    directions, guard, packets). Raises ConfigError with the field's name, UnknownNameError, MissingExtraError.
+    directions, guard, packets), and ``boot``, the boot number of the first start, for runs that shall be repeated;
+    without it every start draws one. Raises ConfigError with the field's name, UnknownNameError, MissingExtraError.
     """
 
     def __init__(
@@ -90,12 +94,13 @@ class Robot:
         address: int,
         rate_hz: float = 5.0,
         params: Mapping[str, float] | None = None,
-        **options: float,
+        **options: float | None,
     ) -> None:
         self._planner = planner_of(planner)
         self.body, self.lidar = check_body(body), check_lidar(lidar)
         self.address, self.rate_hz = check_address(address), check_rate(rate_hz)
         self.params = self._planner.params(params)
+        self._next_boot = check_boot(options.pop("boot", None))
         self._options = options_of(options)
         self._period_s = 1.0 / self.rate_hz
         self.faults: Counter[str] = Counter()
@@ -106,7 +111,8 @@ class Robot:
         self.reset()
 
     def reset(self) -> None:
-        """Forget everything but the counts of faults: as after switching on."""
+        """Forget everything but the counts of faults: as after switching on. Others know it by a new boot number."""
+        self.boot = self._draw_boot()
         self._scans, self.rows = self._set_up()
         self._mail = Mail()
         self._trail = Trail((STALE_PERIODS + JUMP_PERIODS) * self._period_s, self._period_s)
@@ -114,6 +120,13 @@ class Robot:
         self._ahead_s = 0.0
         self._driven: Pose = (0.0, 0.0, 0.0)
         self.seen = []
+
+    def _draw_boot(self) -> int:
+        """Return the boot number of this start."""
+        if self._next_boot is None:
+            return int.from_bytes(os.urandom(2), "little")
+        boot, self._next_boot = self._next_boot, (self._next_boot + 1) % BOOTS
+        return boot
 
     def warm_up(self, say: Callable[[str], None] | None = None) -> WarmUp:
         """Compile or load the kernels and networks that ``tick`` needs; ``say`` is told what it did."""
@@ -170,7 +183,7 @@ class Robot:
         scans = Scans(self.lidar, self._period_s, self.body.radius_m + clearance)
         rig = rig_of(self.body, self.lidar, scans, self._options)
         check_horizon(rig, self._period_s)
-        return scans, Rows(self._planner, rig, self.params, self.address)
+        return scans, Rows(self._planner, rig, self.params, self.address, self.boot)
 
     def _take_time_and_motion(self, now_s: Any, moved: Any) -> None:
         """Take in clock and odometry; raises Unusable."""

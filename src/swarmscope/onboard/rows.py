@@ -15,10 +15,10 @@ from swarmscope.onboard.view import View, new_swarm, python_view
 class Rows:
     """A swarm of one."""
 
-    def __init__(self, planner: Planner, rig: Rig, params: Any, address: int) -> None:
+    def __init__(self, planner: Planner, rig: Rig, params: Any, address: int, boot: int = 0) -> None:
         self.rig, self.params, self.planner = rig, params, planner
         self.swarm, self.memories = new_swarm(1, rig), planner.new_memory(1)
-        self.swarm.percepts["id"] = address
+        self.swarm.percepts["id"], self.swarm.percepts["boot"] = address, boot
         self._given = {name: self.swarm.percepts[name] for name in PERCEPT.names or ()}
         self._said = {name: self.swarm.decisions[name] for name in DECISION.names or ()}
 

@@ -14,7 +14,7 @@ from swarmscope._jit import jit_paste
 from swarmscope.onboard.body import Protection
 from swarmscope.onboard.percept import DECISION, PERCEPT, Row, new_shared
 from swarmscope.onboard.rig import Rig, level_of, margins_at
-from swarmscope.onboard.sharing.message import MAX_FEATURES
+from swarmscope.onboard.sharing.message import HEADER_FIELDS, MAX_FEATURES
 
 
 class Table(NamedTuple):
@@ -57,7 +57,7 @@ class View(NamedTuple):
     other: Table
     """Scratch for somebody's features."""
     header: np.ndarray
-    """(5,) int64: scratch of the decoder."""
+    """(6,) int64: scratch of the decoder."""
 
 
 class Swarm(NamedTuple):
@@ -103,7 +103,7 @@ def new_swarm(robots: int, rig: Rig) -> Swarm:
         padded=np.zeros((robots, beams + 2 * rig.half), np.float32),
         filtered=np.zeros((robots, beams), np.float32),
         other=_table(robots),
-        header=np.zeros((robots, 5), np.int64),
+        header=np.zeros((robots, len(HEADER_FIELDS)), np.int64),
     )
 
 

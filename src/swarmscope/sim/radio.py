@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 
 from swarmscope._jit import jit, jit_inner
-from swarmscope.onboard.sharing.message import is_request
+from swarmscope.onboard.percept import MAX_OUTBOX
+from swarmscope.onboard.sharing.message import MAX_PACKET_BYTES, is_request
 from swarmscope.sim.state import LINKS, QUEUE, Sim
 from swarmscope.sim.streams import RADIO_LOSS, key, mix, uniform
 
@@ -18,7 +19,7 @@ def exchange(sim: Sim, tick: int) -> None:
         if sim.robots[i]["crashed"]:
             continue
         sim.robots[i]["fusions"] += decision["fused"]
-        for k in range(decision["n_out"]):
+        for k in range(min(MAX_OUTBOX, decision["n_out"])):
             _send(sim, tick, i, k)
 
 
@@ -27,7 +28,7 @@ def _send(sim: Sim, tick: int, i: int, k: int) -> None:
     """Send packet k of robot i: count it, then lose it, refuse it or queue it."""
     sender, decision, radio = sim.robots[i], sim.decisions[i], sim.radio
     j, length = decision["out_to"][k], decision["out_length"][k]
-    if j < 0 or j >= sim.robots.size or length <= 0:
+    if j < 0 or j >= sim.robots.size or length <= 0 or length > MAX_PACKET_BYTES:
         return
     features = not is_request(decision["out"][k, 0])
     receiver = sim.robots[j]

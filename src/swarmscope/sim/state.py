@@ -12,6 +12,7 @@ from swarmscope.onboard.rig import Rig
 from swarmscope.onboard.sharing.message import MAX_PACKET_BYTES
 from swarmscope.onboard.view import Swarm, new_swarm
 from swarmscope.sim.lidar import Beams
+from swarmscope.sim.streams import boot_number
 from swarmscope.sim.world import World
 
 QUEUE = 32
@@ -28,6 +29,7 @@ ROBOT = np.dtype(
         ("last_yaw", np.float64),
         ("goal_x", np.float64),
         ("goal_y", np.float64),
+        ("boots", np.int64),  # starts after the first one
         ("crashed", np.uint8),
         ("arrived", np.uint8),
         ("arrival_s", np.float64),
@@ -207,6 +209,8 @@ def new_sim(
     swarm = new_swarm(n, rig)
     swarm.percepts["dt_s"] = clock.dt
     clock = clock._replace(substeps=enough_substeps(clock, rig.body.v_max_mps, rig.body.w_max_radps))
+    with np.errstate(over="ignore"):  # without the compiler
+        swarm.percepts["boot"] = [boot_number(clock.seed, i, 0) for i in range(n)]
     columns = max(1, int(np.ceil((bounds[2] - bounds[0]) / CELL_M)))
     rows = max(1, int(np.ceil((bounds[3] - bounds[1]) / CELL_M)))
     sim = Sim(

@@ -9,7 +9,7 @@ import numpy as np
 
 from swarmscope._jit import jit, jit_inline
 
-SCAN_NOISE, SCAN_DROP, RANGE_NOISE, BEARING_NOISE, COMPASS_NOISE, RADIO_LOSS = range(1, 7)
+SCAN_NOISE, SCAN_DROP, RANGE_NOISE, BEARING_NOISE, COMPASS_NOISE, RADIO_LOSS, BOOT = range(1, 8)
 """Purposes."""
 
 Bits: TypeAlias = Any
@@ -25,6 +25,7 @@ _C = np.uint64(0x94D049BB133111EB)
 _S30, _S27, _S31, _S11 = np.uint64(30), np.uint64(27), np.uint64(31), np.uint64(11)
 _MASK = np.uint64(_LEVELS - 1)
 _S12 = np.uint64(12)
+_S48 = np.uint64(48)
 
 
 @jit_inline
@@ -42,6 +43,12 @@ def key(seed: int, robot: int, tick: int, purpose: int) -> Bits:
     k = mix(k + np.uint64(robot) * _A + np.uint64(1))
     k = mix(k + np.uint64(tick) * _A + np.uint64(2))
     return mix(k + np.uint64(purpose) * _A + np.uint64(3))
+
+
+@jit
+def boot_number(seed: int, robot: int, boots: int) -> int:
+    """Return the number, 0 to 65535, of a robot's start after ``boots`` earlier ones."""
+    return int(key(seed, robot, boots, BOOT) >> _S48)
 
 
 @jit_inline

@@ -29,9 +29,13 @@ from swarmscope.onboard.network.local_map import (
 from swarmscope.onboard.percept import MAX_OUTBOX
 from swarmscope.onboard.planners import load_planner
 from swarmscope.onboard.reasons import R_ALONE, R_ANSWERS, R_FUSED
+from swarmscope.onboard.sharing.inbox import OWN_ROOM
 from swarmscope.onboard.sharing.message import (
+    DIRECTED_REQUEST_BYTES,
+    HEADER_FIELDS,
     KIND_DIRECTED_REQUEST,
     KIND_LATENT,
+    MAX_PACKET_BYTES,
     OK,
     Head,
     decode,
@@ -103,7 +107,7 @@ class Robots:
         """The outbox of robot i as [(to, header, bytes)]."""
         row, found = self.decisions[i], []
         for k in range(row["n_out"]):
-            data, header = row["out"][k, : row["out_length"][k]].copy(), np.zeros(5, np.int64)
+            data, header = row["out"][k, : row["out_length"][k]].copy(), np.zeros(len(HEADER_FIELDS), np.int64)
             assert decode(data, data.size, header) == OK
             found.append((int(row["out_to"][k]), header.tolist(), data.tobytes()))
         return found
@@ -125,9 +129,9 @@ def planner_of(model):
 
 
 def answer_of(sender, seq, reply_to, codes=None):
-    out = np.zeros(138, np.uint8)
+    out = np.zeros(MAX_PACKET_BYTES, np.uint8)
     codes = np.full(128, 5, np.uint8) if codes is None else codes
-    return out[: encode_latent(Head(sender, seq, reply_to), codes, 150, out)].tobytes()
+    return out[: encode_latent(Head(sender, 0, seq, reply_to), codes, 150, out)].tobytes()
 
 
 def picture_of(robots, i, pose, other, target):
@@ -233,7 +237,7 @@ def test_a_replayed_and_a_second_answer_are_dropped(model):
     robots = Robots(planner_of(model)).step()
     answer = robots.exchange()
     again = answer_of(1, 30, 1)
-    kept = np.frombuffer(answer, np.uint8)[8:136]
+    kept = np.frombuffer(answer, np.uint8)[10:138]
     robots.hand(0, answer, answer, again).step()
     assert robots.dropped == (0, 2)
     assert robots.memories["latent"][0, 0].tolist() == kept.tolist()
@@ -290,19 +294,19 @@ def test_a_robot_at_its_goal_answers(model):
     assert (to, header[0], header[3]) == (0, KIND_LATENT, int(robots.shared["asked_seq"][0]))
 
 
-def test_answers_to_others_are_not_starved_by_own_requests(model):
+def test_own_requests_and_answers_to_others_share_the_outbox(model):
     around = [(1.5 * math.cos(a), 1.5 * math.sin(a), 0.0) for a in np.linspace(1.8, 5.0, 9)]
     robots = Robots(planner_of(model), (A, *around))
     packets = []
     for k in range(6):
-        out = np.zeros(8, np.uint8)
-        encode_directed_request(20 + k, 1, 0.5 * k, out)
+        out = np.zeros(DIRECTED_REQUEST_BYTES, np.uint8)
+        encode_directed_request(Head(20 + k, 0, 1, 0), 0.5 * k, out)
         packets.append(out.tobytes())
     robots.hand(0, *packets).step()
     kinds = [header[0] for _, header, _ in robots.sent(0)]
-    assert sorted(kinds) == [KIND_DIRECTED_REQUEST] * 2 + [KIND_LATENT] * 6
+    assert sorted(kinds) == [KIND_DIRECTED_REQUEST] * OWN_ROOM + [KIND_LATENT] * (MAX_OUTBOX - OWN_ROOM)
     assert len(kinds) == MAX_OUTBOX
-    nearest = [int(n) for n in robots.percepts["neighbour_id"][0, :2]]
+    nearest = [int(n) for n in robots.percepts["neighbour_id"][0, :OWN_ROOM]]
     assert [to for to, header, _ in robots.sent(0) if header[0] == KIND_DIRECTED_REQUEST] == nearest
 
 
@@ -337,7 +341,7 @@ def test_a_swarm_arrives_without_collision_and_the_same_with_two_threads(model):
     assert one.robots["arrived"].all()
     assert not one.robots["crashed"].any()
     assert (one.choices["heard"] > 0).any()
-    assert one.robots["feature_bytes"].sum() == 138 * one.robots["sent_features"].sum() > 0
+    assert one.robots["feature_bytes"].sum() == MAX_PACKET_BYTES * one.robots["sent_features"].sum() > 0
     for name in ("x", "y", "p_left", "side", "reason", "bytes_sent"):
         assert getattr(one.records, name).tobytes() == getattr(two.records, name).tobytes(), name
     assert one.choices.tobytes() == two.choices.tobytes()

@@ -12,7 +12,7 @@ from swarmscope.errors import ConfigError
 from swarmscope.judging.sides import judged_by, make_advice
 from swarmscope.onboard.planners import load_planner
 from swarmscope.onboard.reasons import ADVANCE, DECIDE, FOLLOW
-from swarmscope.onboard.sharing.message import REQUEST_BYTES, encode_request
+from swarmscope.onboard.sharing.message import REQUEST_BYTES, Head, encode_request
 from swarmscope.scenarios.places import make_setup
 from swarmscope.scenarios.read import parse_scenario
 from swarmscope.scenarios.to_kernels import make_setting
@@ -80,7 +80,7 @@ def test_nobody_is_asked_or_answered(name):
 def test_a_request_is_not_answered():
     """Packed as on the radio; Nav-SCOPE answers the same one."""
     out = np.zeros(REQUEST_BYTES, np.uint8)
-    packet = out[: encode_request(1, 7, out)].tobytes()
+    packet = out[: encode_request(Head(1, 0, 7, 0), out)].tobytes()
     for name, answers in (("nav-scope", 1), ("nav-i", 0), ("oracle", 0)):
         robot = robot_before(name, (1.2, 0.05, 0.3))
         robot.receive([packet])

@@ -21,7 +21,7 @@ from swarmscope.onboard.sharing.message import OK, decode
 from swarmscope.onboard.view import arrays_of, new_swarm
 
 PLANNERS = planner_names()
-MEMORY_LIMIT = 14_900
+MEMORY_LIMIT = 16_300
 """Bytes of planner memory per robot."""
 LATENTS = 1_200
 """Bytes more for planners that keep what the networks of eight neighbours say."""
@@ -75,7 +75,7 @@ def step(robot):
     assert d["side"] in (-1, 0, 1)
     assert 0 <= d["n_out"] <= MAX_OUTBOX
     for k in range(d["n_out"]):
-        assert decode(d["out"][k], int(d["out_length"][k]), np.zeros(5, np.int64)) == OK
+        assert decode(d["out"][k], int(d["out_length"][k]), np.zeros(6, np.int64)) == OK
     for p in (d["p_self"], d["p_left"]):
         assert np.isnan(p) or 0.0 <= p <= 1.0
     return robot

@@ -12,9 +12,23 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from helpers import one_robot, rig_of
-from swarmscope.onboard.percept import MAX_INBOX, MAX_OUTBOX, PEERS
-from swarmscope.onboard.sharing.feature_message import FeatureMessage
+from packets import (
+    ANGLES,
+    DISTANCES,
+    RANGE_MAX,
+    asked,
+    dropped,
+    features,
+    header_of,
+    latent,
+    read,
+    request,
+    rows_of,
+    sent,
+)
+from swarmscope.onboard.percept import MAX_INBOX, MAX_OUTBOX, PEERS, SHARED
 from swarmscope.onboard.sharing.inbox import (
+    OWN_ROOM,
     answer_all,
     ask,
     read_inbox,
@@ -27,59 +41,9 @@ from swarmscope.onboard.sharing.message import (
     KIND_REQUEST,
     MAX_FEATURES,
     MAX_PACKET_BYTES,
-    OK,
-    decode,
-    encode_request,
 )
+from swarmscope.onboard.sharing.peers import ANSWERS_PER_S
 from swarmscope.onboard.view import new_swarm, python_view
-
-RANGE_MAX = 5.0
-ANGLES, DISTANCES = (0.5, 2.0, 4.0), (1.0, 2.0, 3.0)
-
-
-def request(sender, seq):
-    out = np.zeros(MAX_PACKET_BYTES, np.uint8)
-    return out[: encode_request(sender, seq, out)].tobytes()
-
-
-def features(sender, seq, reply_to):
-    return FeatureMessage(sender, seq, reply_to, ANGLES, DISTANCES).pack(RANGE_MAX)
-
-
-def rows_of(now=10.0, **options):
-    rows = one_robot(rig_of(**options), address=1)
-    rows.fill(now_s=now)
-    return rows
-
-
-def read(rows, *packets):
-    rows.receive(list(packets))
-    read_inbox(rows.view)
-    return rows.shared
-
-
-def dropped(row):
-    return int(row["dropped_bad"]), int(row["dropped_stale"])
-
-
-def asked(rows, *peers):
-    start_round(rows.view)
-    for peer in peers:
-        ask(rows.view, peer)
-    return int(rows.shared["asked_seq"])
-
-
-def sent(row):
-    """The outbox of a decision as [(to, bytes)]."""
-    return [
-        (int(row["out_to"][k]), row["out"][k, : row["out_length"][k]].tobytes()) for k in range(row["n_out"])
-    ]
-
-
-def header_of(packet):
-    header = np.zeros(5, np.int64)
-    assert decode(np.frombuffer(packet, np.uint8).copy(), len(packet), header) == OK
-    return header.tolist()
 
 
 def test_a_good_answer_is_remembered():
@@ -98,14 +62,14 @@ def test_requests_wait_to_be_answered_for_this_tick_only():
     rows = rows_of()
     row = read(rows, request(5, 1), request(6, 9))
     assert row["ask_id"][: row["ask_n"]].tolist() == [5, 6]
-    assert row["ask_seq"][: row["ask_n"]].tolist() == [1, 9]
+    assert row["ask_name"][: row["ask_n"]].tolist() == [1, 9]
     assert read(rows)["ask_n"] == 0
 
 
 @pytest.mark.parametrize("exact", [False, True])
-def test_answers_carry_the_askers_sequence_number(exact):
-    rows = rows_of(exact_features=exact)
-    read(rows, request(5, 31), request(6, 777))
+def test_answers_name_the_request_and_carry_our_boot_number(exact):
+    rows = rows_of(exact_features=exact, boot=0x4321)
+    read(rows, request(5, 31, boot=0x0100), request(6, 777))
     own = rows.view.own
     own.angles[:3], own.distances[:3] = ANGLES, DISTANCES
     answer_all(rows.view, 3)
@@ -115,20 +79,19 @@ def test_answers_carry_the_askers_sequence_number(exact):
     headers = [header_of(packet) for _, packet in out]
     assert [h[0] for h in headers] == [kind, kind]
     assert [h[1] for h in headers] == [1, 1]
-    assert [h[3] for h in headers] == [31, 777]
+    assert [h[3] for h in headers] == [0x0100 + 31, 777]
+    assert [h[5] for h in headers] == [0x4321, 0x4321]
     assert headers[0][2] != headers[1][2]
 
 
-def test_requests_carry_our_address_and_the_rounds_number():
-    rows = rows_of()
-    seq = asked(rows, 4, 8)
-    assert [(to, header_of(p)[:3]) for to, p in sent(rows.decision)] == [
-        (4, [KIND_REQUEST, 1, seq]),
-        (8, [KIND_REQUEST, 1, seq]),
-    ]
+def test_requests_carry_our_address_our_boot_number_and_the_rounds_number():
+    rows = rows_of(boot=0x4321)
+    asked(rows, 4, 8)
+    expected = [KIND_REQUEST, 1, 1, -1, -1, 0x4321]
+    assert [(to, header_of(p)) for to, p in sent(rows.decision)] == [(4, expected), (8, expected)]
 
 
-@given(st.integers(0, 15), st.integers(0, 7))
+@given(st.integers(0, 17), st.integers(0, 7))
 def test_a_corrupt_packet_is_dropped(byte, bit):
     rows = rows_of()
     packet = bytearray(features(5, 40, asked(rows, 5)))
@@ -138,7 +101,7 @@ def test_a_corrupt_packet_is_dropped(byte, bit):
     assert (row["heard_id"] == -1).all()
 
 
-@pytest.mark.parametrize("length", range(16))
+@pytest.mark.parametrize("length", range(18))
 def test_a_truncated_packet_is_dropped(length):
     rows = rows_of()
     row = read(rows, features(5, 40, asked(rows, 5))[:length])
@@ -147,7 +110,7 @@ def test_a_truncated_packet_is_dropped(length):
 
 
 def test_a_foreign_packet_is_dropped():
-    assert dropped(read(rows_of(), b"hello, this is not for you", bytes(20), b"\xff" * 138)) == (3, 0)
+    assert dropped(read(rows_of(), b"hello, this is not for you", bytes(20), b"\xff" * 140)) == (3, 0)
 
 
 def test_our_own_packet_coming_back_is_dropped():
@@ -164,18 +127,12 @@ def test_a_replayed_packet_is_dropped():
     assert row["answers_n"] == 1
 
 
-def test_older_than_the_newest_of_its_sender_is_dropped_also_over_the_wrap():
-    rows = rows_of()
-    row = read(rows, request(5, 65530), request(5, 65529), request(5, 3), request(5, 65535))
-    assert row["ask_seq"][: row["ask_n"]].tolist() == [65530, 3]
-    assert dropped(row) == (0, 2)
-
-
 def test_unasked_for_features_are_dropped():
     rows = rows_of()
     assert dropped(read(rows, features(5, 40, 0))) == (0, 1)
     seq = asked(rows, 5)
     assert dropped(read(rows, features(5, 41, seq + 1))) == (0, 2)
+    assert dropped(read(rows, features(6, 41, seq))) == (0, 3)  # asked, but not this one
 
 
 def test_an_answer_to_an_earlier_round_is_dropped():
@@ -220,6 +177,7 @@ def test_waiting_ends_with_the_last_answer_or_with_the_patience():
 def test_more_senders_than_slots_keep_being_heard():
     rows = rows_of()
     for sender in range(100, 100 + 5 * PEERS):
+        rows.percept["now_s"] += 0.2
         row = read(rows, request(sender, 7))
         assert row["ask_id"][0] == sender
     assert dropped(row) == (0, 0)
@@ -235,10 +193,96 @@ def test_a_full_outbox_takes_no_more():
     assert rows.decision["n_out"] == MAX_OUTBOX
 
 
+@pytest.mark.parametrize("make", [features, latent])
+def test_everybody_answers_once_and_nobody_who_was_not_asked(make):
+    rows = rows_of()
+    seq = asked(rows, 5, 6)
+    row = read(rows, make(5, 40, seq), make(5, 41, seq), make(999, 7, seq), make(999, 8, seq))
+    assert (int(row["answers_n"]), dropped(row)) == (1, (0, 3))
+    assert waiting_for_answers(rows.percept, row, 0.6)
+    row = read(rows, *[make(6, 50 + k, seq) for k in range(MAX_INBOX)])
+    assert int(row["answers_n"]) == int(row["asked_n"]) == 2
+    assert 999 not in row["heard_id"]
+    assert int(row["latent_n"]) == (1 if make is latent else 0)
+
+
+def test_an_answer_to_an_earlier_life_is_dropped():
+    """After a restart the counter begins anew: only the boot number tells the rounds apart."""
+    rows = rows_of(boot=0x1111)
+    old = features(5, 40, asked(rows, 5))
+    rows = rows_of(boot=0x2222)
+    seq = asked(rows, 5)
+    assert rows.shared["asked_seq"] == 1
+    assert dropped(read(rows, old)) == (0, 1)
+    assert dropped(read(rows, features(5, 41, seq))) == (0, 1)
+    assert rows.shared["answers_n"] == 1
+
+
+def test_a_sender_is_answered_once_a_tick_and_five_times_a_second():
+    rows = rows_of()
+    row = read(rows, *[request(5, k) for k in range(1, 5)])
+    assert row["ask_id"][: row["ask_n"]].tolist() == [5]
+    assert row["ask_name"][0] == 4  # the newest: older rounds of it are closed
+    answered = []
+    for k in range(60):
+        rows.percept["now_s"] += 0.05
+        answered.append(int(read(rows, request(5, 5 + k), request(6, k))["ask_n"]))
+    in_a_second = [sum(answered[k : k + 20]) for k in range(0, 60, 20)]
+    assert max(in_a_second) <= 2 * 2 * ANSWERS_PER_S
+    assert sum(answered) <= 2 * ANSWERS_PER_S * 4
+    assert sum(answered) >= 2 * ANSWERS_PER_S * 3 - 1
+
+
+def test_eight_requests_of_others_leave_room_for_our_own():
+    rows = rows_of()
+    read(rows, *(request(100 + k, 1) for k in range(MAX_INBOX)))
+    answer_all(rows.view, 4)
+    assert rows.decision["n_out"] == MAX_OUTBOX
+    seq = asked(rows, 2, 3)
+    assert (int(rows.decision["n_out"]), int(rows.shared["asked_n"])) == (MAX_OUTBOX, 2)
+    out = sent(rows.decision)
+    assert [to for to, packet in out if header_of(packet)[0] == KIND_REQUEST] == [3, 2]
+    assert [to for to, _ in out[:6]] == list(range(100, 106))
+    row = read(rows, features(2, 1, seq), features(3, 1, seq))
+    assert int(row["answers_n"]) == 2
+
+
+def test_own_requests_leave_half_of_a_full_outbox_to_answers():
+    rows = rows_of()
+    read(rows, *(request(100 + k, 1) for k in range(MAX_INBOX)))
+    answer_all(rows.view, 4)
+    asked(rows, *range(2, 10))
+    kinds = [header_of(packet)[0] for _, packet in sent(rows.decision)]
+    assert (kinds.count(KIND_REQUEST), kinds.count(KIND_FEATURES)) == (OWN_ROOM, MAX_OUTBOX - OWN_ROOM)
+    assert rows.shared["asked_n"] == OWN_ROOM
+
+
+@pytest.mark.parametrize("wild", [-(2**62), -1, MAX_INBOX + 1, 2**62])
+def test_wild_counts_are_clamped(wild):
+    """No count is trusted, whoever filled it in: nothing beside the tables is read or written."""
+    swarm = new_swarm(3, rig_of())
+    before = [array.tobytes() for array in (swarm.percepts[1:], swarm.shared[1:], swarm.decisions[1:])]
+    see = python_view(swarm, 0)
+    see.percept["n_packets"] = wild
+    see.percept["packet_length"] = wild
+    read_inbox(see)
+    assert dropped(see.shared) == (0 if wild < 0 else MAX_INBOX, 0)
+    see.shared["ask_n"] = wild
+    see.out["n_out"] = 0
+    answer_all(see, wild)
+    assert 0 <= see.out["n_out"] <= MAX_OUTBOX
+    after = [array.tobytes() for array in (swarm.percepts[1:], swarm.shared[1:], swarm.decisions[1:])]
+    assert after == before
+
+
+GUARDED = [name for name in SHARED.names if name.startswith("track_")] + ["x", "y", "compass", "started"]
 packets = st.one_of(
     st.binary(max_size=MAX_PACKET_BYTES),
-    st.builds(request, st.integers(0, 65535), st.integers(0, 65535)),
+    st.builds(request, st.integers(0, 65535), st.integers(0, 65535), st.integers(0, 65535)),
+    st.builds(request, st.integers(0, 3), st.integers(0, 200), st.integers(0, 2)),
     st.builds(features, st.integers(0, 65535), st.integers(0, 65535), st.integers(0, 3)),
+    st.builds(features, st.integers(4, 6), st.integers(0, 65535), st.integers(0, 12), st.integers(0, 2)),
+    st.builds(latent, st.integers(4, 6), st.integers(0, 65535), st.integers(0, 12), st.integers(0, 2)),
 )
 
 
@@ -256,10 +300,17 @@ def test_any_packets_in_any_order_leave_the_tables_whole(ticks):
         swarm.decisions["n_out"] = 0
         start_round(see)
         ask(see, 5)
+        ask(see, 6)
+        guarded = [see.shared[name].tobytes() for name in GUARDED]
         read_inbox(see)
         row = see.shared
+        assert [row[name].tobytes() for name in GUARDED] == guarded  # no packet moves what the guard looks at
         seen += len(inbox)
         assert 0 <= row["ask_n"] <= PEERS
+        assert 0 <= row["answers_n"] <= row["asked_n"] == 2
+        assert 0 <= row["latent_n"] <= 2
+        senders = row["sender_id"][row["sender_id"] >= 0].tolist()
+        assert len(senders) == len(set(senders))
         assert ((row["heard_n"] >= 0) & (row["heard_n"] <= MAX_FEATURES)).all()
         assert np.isfinite(row["heard_angle"]).all()
         assert ((row["heard_distance"] >= 0.0) & (row["heard_distance"] <= RANGE_MAX)).all()

@@ -36,6 +36,7 @@ from swarmscope.onboard.sharing.message import (
     MAX_PACKET_BYTES,
     OK,
     REQUEST_BYTES,
+    SEALED,
     STATUS_NAMES,
     TOO_SHORT,
     Head,
@@ -48,10 +49,10 @@ from swarmscope.onboard.sharing.message import (
     encode_request,
     extremum_kind,
     is_request,
+    name_of,
     quantise_features,
     read_features,
     read_latent,
-    seq_newer,
 )
 
 RANGE = 5.0
@@ -65,35 +66,35 @@ def for_any(*strategies):
 
 
 def features(angles, distances, n=None, range_max=RANGE, encode=encode_features):
-    """Encode with fixed numbers 0x0102, 0x0304, 0x0506."""
+    """Encode with fixed numbers: sender 0x0102, boot 0x0708, seq 0x0304, reply_to 0x0506."""
     out = np.zeros(MAX_FEATURES_BYTES, np.uint8)
     angles, distances = np.array(angles, np.float64), np.array(distances, np.float64)
     n = angles.size if n is None else n
-    length = encode(Head(0x0102, 0x0304, 0x0506), angles, distances, n, range_max, out)
+    length = encode(Head(0x0102, 0x0708, 0x0304, 0x0506), angles, distances, n, range_max, out)
     return out[:length].copy()
 
 
 def exact(angles, distances, n=None):
     out = np.zeros(MAX_PACKET_BYTES, np.uint8)
     angles, distances = np.array(angles, np.float64), np.array(distances, np.float64)
-    length = encode_exact_features(Head(1, 2, 3), angles, distances, angles.size if n is None else n, out)
+    length = encode_exact_features(Head(1, 4, 2, 3), angles, distances, angles.size if n is None else n, out)
     return out[:length].copy()
 
 
-def request(sender=5, seq=6):
+def request(sender=5, seq=6, boot=9):
     out = np.zeros(REQUEST_BYTES, np.uint8)
-    return out[: encode_request(sender, seq, out)].copy()
+    return out[: encode_request(Head(sender, boot, seq, 0), out)].copy()
 
 
-def directed(direction, sender=5, seq=6):
+def directed(direction, sender=5, seq=6, boot=9):
     out = np.zeros(DIRECTED_REQUEST_BYTES, np.uint8)
-    return out[: encode_directed_request(sender, seq, direction, out)].copy()
+    return out[: encode_directed_request(Head(sender, boot, seq, 0), direction, out)].copy()
 
 
-def latent(codes=None, scale=200, sender=5, seq=6, reply_to=7):
+def latent(codes=None, scale=200, sender=5, seq=6, reply_to=7, boot=9):
     out = np.zeros(MAX_PACKET_BYTES, np.uint8)
     codes = np.arange(LATENT_FEATURES, dtype=np.uint8) if codes is None else codes
-    return out[: encode_latent(Head(sender, seq, reply_to), codes, scale, out)].copy()
+    return out[: encode_latent(Head(sender, boot, seq, reply_to), codes, scale, out)].copy()
 
 
 def status_of(data, length=None):
@@ -129,41 +130,41 @@ PAIRS = st.lists(
 def test_features_packet_worked_by_hand():
     # 1/4, 1/2, 3/4 of a turn are 0x40, 0x80, 0xc0; 1, 2, 4 m of 5 m are 51, 102, 204
     packet = features([math.pi, -math.pi / 2.0, math.pi / 2.0], [2.0, 4.0, 1.0])
-    assert packet.tobytes().hex(" ") == "12 02 01 04 03 06 05 03 40 80 c0 33 66 cc 8a 02"
+    assert packet.tobytes().hex(" ") == "22 02 01 08 07 04 03 06 05 03 40 80 c0 33 66 cc 44 f6"
     assert packet.tobytes() == sealed(packet.tobytes()[:-2]).tobytes()
 
 
 def test_request_packet_worked_by_hand():
-    packet = request(sender=0x0005, seq=0xABCD)
-    assert packet.tobytes().hex(" ") == "11 05 00 cd ab 3d b8"
+    packet = request(sender=0x0005, seq=0xABCD, boot=0x1234)
+    assert packet.tobytes().hex(" ") == "21 05 00 34 12 cd ab 0a 41"
     assert packet.tobytes() == sealed(packet.tobytes()[:-2]).tobytes()
 
 
 def test_exact_packet_holds_float32():
     packet = exact([math.pi], [2.5])
     expected = np.array([math.pi, 2.5], "<f4").tobytes()
-    assert packet.tobytes()[:-2] == bytes.fromhex("13 0100 0200 0300 01") + expected
+    assert packet.tobytes()[:-2] == bytes.fromhex("23 0100 0400 0200 0300 01") + expected
 
 
 @pytest.mark.parametrize("n", range(MAX_FEATURES + 1))
 def test_sizes(n):
-    assert a_packet(n).size == 10 + 2 * n <= MAX_FEATURES_BYTES
-    assert exact(np.zeros(n), np.zeros(n)).size == 10 + 8 * n <= MAX_PACKET_BYTES
-    assert request().size == REQUEST_BYTES == 7
+    assert a_packet(n).size == 12 + 2 * n <= MAX_FEATURES_BYTES
+    assert exact(np.zeros(n), np.zeros(n)).size == 12 + 8 * n <= MAX_PACKET_BYTES
+    assert request().size == REQUEST_BYTES == 9
 
 
 def test_directed_request_worked_by_hand():
-    packet = directed(math.pi / 2.0, sender=0x0005, seq=0xABCD)
-    assert packet.tobytes()[:-2].hex(" ") == "14 05 00 cd ab 40"
+    packet = directed(math.pi / 2.0, sender=0x0005, seq=0xABCD, boot=0x1234)
+    assert packet.tobytes()[:-2].hex(" ") == "24 05 00 34 12 cd ab 40"
     assert packet.tobytes() == sealed(packet.tobytes()[:-2]).tobytes()
-    assert packet.size == DIRECTED_REQUEST_BYTES == 8
+    assert packet.size == DIRECTED_REQUEST_BYTES == 10
 
 
 def test_latent_packet_worked_by_hand():
-    packet = latent(scale=0xC8, sender=0x0102, seq=0x0304, reply_to=0x0506)
-    head = bytes.fromhex("15 02 01 04 03 06 05 c8")
+    packet = latent(scale=0xC8, sender=0x0102, seq=0x0304, reply_to=0x0506, boot=0x0708)
+    head = bytes.fromhex("25 02 01 08 07 04 03 06 05 c8")
     assert packet.tobytes() == sealed(head + bytes(range(128))).tobytes()
-    assert packet.size == MAX_PACKET_BYTES == 138
+    assert packet.size == MAX_PACKET_BYTES == 140
 
 
 def test_crc_check_value():
@@ -186,7 +187,7 @@ def test_crc_equals_the_standard_library(data, init):
 def test_round_trip(pairs, range_max):
     angles, distances = pairs
     packet = features(angles, distances, range_max=range_max)
-    assert status_of(packet) == (OK, [KIND_FEATURES, 0x0102, 0x0304, 0x0506, len(angles)])
+    assert status_of(packet) == (OK, [KIND_FEATURES, 0x0102, 0x0304, 0x0506, len(angles), 0x0708])
     got_angles, got_distances = read(packet, range_max)
     assert np.all(np.diff(got_angles) >= 0.0)
     assert np.all((got_angles >= 0.0) & (got_angles < TURN))
@@ -222,7 +223,7 @@ def test_quantise_features_gives_what_a_receiver_reads(pairs, range_max):
 @for_any(PAIRS)
 def test_exact_round_trip(pairs):
     packet = exact(*pairs)
-    assert status_of(packet) == (OK, [KIND_EXACT_FEATURES, 1, 2, 3, len(pairs[0])])
+    assert status_of(packet) == (OK, [KIND_EXACT_FEATURES, 1, 2, 3, len(pairs[0]), 4])
     got_angles, got_distances = read(packet)
     assert np.all(np.diff(got_angles) >= 0.0)
     assert np.all((got_angles >= 0.0) & (got_angles < TURN))
@@ -232,24 +233,24 @@ def test_exact_round_trip(pairs):
         assert np.min(np.abs((got_angles - angle + math.pi) % TURN - math.pi)) <= 1e-5
 
 
-@for_any(st.floats(-20.0, 20.0), st.integers(0, 0xFFFF), st.integers(0, 0xFFFF))
-def test_directed_round_trip(direction, sender, seq):
-    packet = directed(direction, sender, seq)
+@for_any(st.floats(-20.0, 20.0), st.integers(0, 0xFFFF), st.integers(0, 0xFFFF), st.integers(0, 0xFFFF))
+def test_directed_round_trip(direction, sender, seq, boot):
+    packet = directed(direction, sender, seq, boot)
     status, header = status_of(packet)
-    assert (status, header[:4]) == (OK, [KIND_DIRECTED_REQUEST, sender, seq, -1])
+    assert (status, header[:4], header[5]) == (OK, [KIND_DIRECTED_REQUEST, sender, seq, -1], boot)
     assert abs((direction_of(header[4]) - direction + math.pi) % TURN - math.pi) <= math.pi / 256.0 + EPS
 
 
 @pytest.mark.parametrize("direction", [math.nan, math.inf, -math.inf, 1e300])
 def test_a_direction_that_is_no_number_is_sent_as_0(direction):
-    assert status_of(directed(direction)) == (OK, [KIND_DIRECTED_REQUEST, 5, 6, -1, 0])
+    assert status_of(directed(direction)) == (OK, [KIND_DIRECTED_REQUEST, 5, 6, -1, 0, 9])
 
 
 @for_any(st.binary(min_size=128, max_size=128), st.integers(-5, 300), st.integers(0, 0xFFFF))
 def test_latent_round_trip(codes, scale, reply_to):
     row = np.frombuffer(codes, np.uint8)
     packet = latent(row, scale, reply_to=reply_to)
-    assert status_of(packet) == (OK, [KIND_LATENT, 5, 6, reply_to, scale & 0xFF])
+    assert status_of(packet) == (OK, [KIND_LATENT, 5, 6, reply_to, scale & 0xFF, 9])
     got = np.zeros(LATENT_FEATURES, np.uint8)
     assert read_latent(packet, packet.size, got) == scale & 0xFF
     assert got.tobytes() == codes
@@ -279,7 +280,7 @@ def test_values_that_are_no_numbers(encoded):
 @pytest.mark.parametrize("bits", [0x7FC00000, 0x7F800000, 0xFF800000, 0xC0000000])
 def test_exact_packet_with_wild_floats_is_tamed(bits):
     wild = bits.to_bytes(4, "little")
-    packet = sealed(bytes.fromhex("13 0100 0200 0300 01") + wild + wild)
+    packet = sealed(bytes.fromhex("23 0100 0900 0200 0300 01") + wild + wild)
     assert status_of(packet)[0] == OK
     angles, distances = read(packet)
     assert 0.0 <= angles[0] < TURN
@@ -288,11 +289,11 @@ def test_exact_packet_with_wild_floats_is_tamed(bits):
 
 @pytest.mark.parametrize("range_max", [0.0, -1.0, math.nan])
 def test_a_senseless_range_gives_zero_distances(range_max):
-    assert features([1.0], [2.0], range_max=range_max)[9] == 0
+    assert features([1.0], [2.0], range_max=range_max)[11] == 0
 
 
 def test_features_that_were_not_sent_sorted_are_read_sorted():
-    packet = sealed(bytes.fromhex("12 0100 0200 0300 02 80 40 ff 00"))
+    packet = sealed(bytes.fromhex("22 0100 0900 0200 0300 02 80 40 ff 00"))
     assert status_of(packet)[0] == OK
     angles, distances = read(packet)
     assert angles.tolist() == [math.pi / 2.0, math.pi]
@@ -301,7 +302,7 @@ def test_features_that_were_not_sent_sorted_are_read_sorted():
 
 def test_inputs_are_left_alone():
     angles, distances = np.array([3.0, 1.0]), np.array([9.0, -9.0])
-    encode_features(Head(1, 2, 3), angles, distances, 2, RANGE, np.zeros(50, np.uint8))
+    encode_features(Head(1, 9, 2, 3), angles, distances, 2, RANGE, np.zeros(50, np.uint8))
     assert angles.tolist() == [3.0, 1.0]
     assert distances.tolist() == [9.0, -9.0]
 
@@ -319,18 +320,19 @@ def test_more_than_16_features_are_cut(encoded):
 @pytest.mark.parametrize("n", [-3, 0, 99])
 def test_wrong_counts_are_cut_to_what_is_there(encoded, n):
     packet = encoded([1.0, 2.0], [1.0, 2.0], n=n)
-    assert packet[7] == min(max(n, 0), 2)
+    assert packet[9] == min(max(n, 0), 2)
     assert status_of(packet)[0] == OK
 
 
 def test_no_room_gives_no_packet():
     two = np.ones(2)
-    assert encode_features(Head(1, 2, 3), two, two, 2, RANGE, np.zeros(13, np.uint8)) == 0
-    assert encode_exact_features(Head(1, 2, 3), two, two, 2, np.zeros(25, np.uint8)) == 0
-    assert encode_request(1, 2, np.zeros(6, np.uint8)) == 0
-    assert encode_directed_request(1, 2, 0.0, np.zeros(7, np.uint8)) == 0
-    assert encode_latent(Head(1, 2, 3), np.zeros(128, np.uint8), 4, np.zeros(137, np.uint8)) == 0
-    assert encode_latent(Head(1, 2, 3), np.zeros(127, np.uint8), 4, np.zeros(138, np.uint8)) == 0
+    head = Head(1, 9, 2, 3)
+    assert encode_features(head, two, two, 2, RANGE, np.zeros(15, np.uint8)) == 0
+    assert encode_exact_features(head, two, two, 2, np.zeros(27, np.uint8)) == 0
+    assert encode_request(head, np.zeros(8, np.uint8)) == 0
+    assert encode_directed_request(head, 0.0, np.zeros(9, np.uint8)) == 0
+    assert encode_latent(head, np.zeros(128, np.uint8), 4, np.zeros(139, np.uint8)) == 0
+    assert encode_latent(head, np.zeros(127, np.uint8), 4, np.zeros(140, np.uint8)) == 0
 
 
 def test_reading_into_short_arrays_stays_inside():
@@ -343,7 +345,7 @@ def test_reading_into_short_arrays_stays_inside():
     codes = np.full(LATENT_FEATURES, 9, np.uint8)
     for packet in (request(), directed(0.0), a_packet(16), exact(np.ones(16), np.ones(16))):
         assert read_latent(packet, packet.size, codes) == -1
-    assert read_latent(latent(), 138, codes[:127]) == -1
+    assert read_latent(latent(), 140, codes[:127]) == -1
     assert (codes == 9).all()
 
 
@@ -356,35 +358,19 @@ def test_reading_what_was_never_decoded_stays_inside(data, length):
     assert -1 <= read_latent(row, length, np.zeros(LATENT_FEATURES, np.uint8)) <= 255
 
 
-@for_any(st.integers(-(10**6), 10**6), st.integers(-(10**6), 10**6))
-def test_numbers_wrap_to_16_bits(sender, seq):
-    assert status_of(request(sender, seq)) == (OK, [KIND_REQUEST, sender % 65536, seq % 65536, -1, -1])
+@for_any(*[st.integers(-(10**6), 10**6)] * 3)
+def test_numbers_wrap_to_16_bits(sender, seq, boot):
+    expected = [KIND_REQUEST, sender % 65536, seq % 65536, -1, -1, boot % 65536]
+    assert status_of(request(sender, seq, boot)) == (OK, expected)
+    assert name_of(boot, seq) == boot % 65536 ^ seq % 65536
 
 
-@pytest.mark.parametrize(
-    ("a", "b", "newer"),
-    [
-        (1, 0, True),
-        (0, 1, False),
-        (7, 7, False),
-        (0, 65535, True),
-        (65535, 0, False),
-        (3, 65530, True),
-        (0x7FFF, 0, True),
-        (0x8000, 0, False),
-        (0, 0x8000, False),
-        (0x8001, 0, False),
-        (65536, 65535, True),
-    ],
-)
-def test_sequence_numbers(a, b, newer):
-    assert seq_newer(a, b) == newer
-
-
-@for_any(st.integers(0, 0xFFFF), st.integers(1, 0x7FFF))
-def test_a_later_number_is_newer_across_the_wrap(seq, later):
-    assert seq_newer((seq + later) & 0xFFFF, seq)
-    assert not seq_newer(seq, (seq + later) & 0xFFFF)
+def test_two_lives_of_one_robot_call_their_requests_differently():
+    """What answers name is not the counter alone: it begins anew with every start."""
+    first = {name_of(0x1234, seq) for seq in range(256)}
+    assert len(first) == 256
+    assert not first & {name_of(0x5634, seq) for seq in range(256)}
+    assert name_of(0x1234, 0x00FF) == 0x12CB
 
 
 # What the air does to packets
@@ -397,17 +383,17 @@ def test_a_later_number_is_newer_across_the_wrap(seq, later):
 )
 @pytest.mark.parametrize("flips", [1, 2])
 def test_every_one_and_two_bit_error_is_found(packet, flips):
-    header = np.zeros(5, np.int64)
+    header = np.zeros(6, np.int64)
     for bits in itertools.combinations(range(8 * packet.size), flips):
         torn = packet.copy()
         for bit in bits:
             torn[bit // 8] ^= 1 << (bit % 8)
         assert decode(torn, torn.size, header) != OK
-        assert header.tolist() == [-1] * 5
+        assert header.tolist() == [-1] * 6
 
 
 def test_every_one_bit_error_of_a_latent_is_found_and_some_of_two():
-    packet, header = latent(), np.zeros(5, np.int64)
+    packet, header = latent(), np.zeros(6, np.int64)
     generator = np.random.default_rng(5)
     pairs = [(b, b) for b in range(8 * packet.size)] + generator.integers(0, 8 * packet.size, (20_000, 2)).tolist()
     for bits in pairs:
@@ -419,7 +405,7 @@ def test_every_one_bit_error_of_a_latent_is_found_and_some_of_two():
 
 def test_every_burst_of_16_bits_is_found():
     packet = a_packet(8)
-    header = np.zeros(5, np.int64)
+    header = np.zeros(6, np.int64)
     generator = np.random.default_rng(2)
     whole = int.from_bytes(packet.tobytes(), "big")
     for shift in range(8 * packet.size - 16):
@@ -430,7 +416,7 @@ def test_every_burst_of_16_bits_is_found():
 
 def test_random_damage_is_found_but_for_one_in_65536():
     packet = a_packet(8)
-    header = np.zeros(5, np.int64)
+    header = np.zeros(6, np.int64)
     generator = np.random.default_rng(3)
     missed = 0
     for _ in range(20_000):
@@ -469,14 +455,14 @@ def test_random_bytes_never_raise(data, length):
     if status == OK:
         check_is_harmless(row[:length])
     else:
-        assert header == [-1] * 5
+        assert header == [-1] * 6
 
 
 def test_random_bytes_with_a_fitting_head_are_refused_by_the_checksum():
-    header = np.zeros(5, np.int64)
-    rows = np.random.default_rng(4).integers(0, 256, (30_000, 26)).astype(np.uint8)
-    rows[:, 0], rows[:, 7] = 0x12, 8
-    statuses = [decode(row, 26, header) for row in rows]
+    header = np.zeros(6, np.int64)
+    rows = np.random.default_rng(4).integers(0, 256, (30_000, 28)).astype(np.uint8)
+    rows[:, 0], rows[:, 9] = 0x22, 8
+    statuses = [decode(row, 28, header) for row in rows]
     assert statuses.count(OK) <= 5
     assert set(statuses) <= {OK, BAD_CHECKSUM}
 
@@ -492,28 +478,30 @@ def test_a_standard_checksum_never_passes(pairs):
     ("head", "status"),
     [
         ("", TOO_SHORT),
-        ("11 0100 02", TOO_SHORT),
-        ("02 0100 0200 0300 00", BAD_VERSION),
-        ("22 0100 0200 0300 00", BAD_VERSION),
-        ("10 0100 0200", BAD_KIND),
-        ("16 0100 0200 0300 00", BAD_KIND),
-        ("14 0100 0200", BAD_LENGTH),
-        ("14 0100 0200 40 00", BAD_LENGTH),
-        ("15 0100 0200 03", TOO_SHORT),
-        ("15 0100 0200 0300 c8" + " 00" * 127, BAD_LENGTH),
-        ("15 0100 0200 0300 c8" + " 00" * 129, BAD_LENGTH),
-        ("14 0100 0200 40", OK),
-        ("15 0100 0200 0300 ff" + " 00" * 128, OK),
-        ("1f 0100 0200 0300 00", BAD_KIND),
-        ("12 0100 0200", TOO_SHORT),
-        ("11 0100 0200 03", BAD_LENGTH),
-        ("12 0100 0200 0300 01 40", BAD_LENGTH),
-        ("12 0100 0200 0300 02 40 ff", BAD_LENGTH),
-        ("12 0100 0200 0300 00 40 ff", BAD_LENGTH),
-        ("12 0100 0200 0300 11" + " 00" * 34, BAD_LENGTH),
-        ("13 0100 0200 0300 01 40 ff", BAD_LENGTH),
-        ("11 0100 0200", OK),
-        ("12 0100 0200 0300 00", OK),
+        ("21 0100 0900 02", TOO_SHORT),
+        ("12 0100 0200 0300 00", BAD_VERSION),
+        ("02 0100 0900 0200 0300 00", BAD_VERSION),
+        ("32 0100 0900 0200 0300 00", BAD_VERSION),
+        ("20 0100 0900 0200", BAD_KIND),
+        ("26 0100 0900 0200 0300 00", BAD_KIND),
+        ("24 0100 0900 0200", BAD_LENGTH),
+        ("24 0100 0900 0200 40 00", BAD_LENGTH),
+        ("25 0100 0900 0200 03", TOO_SHORT),
+        ("25 0100 0900 0200 0300 c8" + " 00" * 127, BAD_LENGTH),
+        ("25 0100 0900 0200 0300 c8" + " 00" * 129, BAD_LENGTH),
+        ("24 0100 0900 0200 40", OK),
+        ("25 0100 0900 0200 0300 ff" + " 00" * 128, OK),
+        ("2f 0100 0900 0200 0300 00", BAD_KIND),
+        *[(f"{0x20 | SEALED | kind:02x} 0100 0900 0200 0300 00", BAD_KIND) for kind in range(8)],
+        ("22 0100 0900 0200", TOO_SHORT),
+        ("21 0100 0900 0200 03", BAD_LENGTH),
+        ("22 0100 0900 0200 0300 01 40", BAD_LENGTH),
+        ("22 0100 0900 0200 0300 02 40 ff", BAD_LENGTH),
+        ("22 0100 0900 0200 0300 00 40 ff", BAD_LENGTH),
+        ("22 0100 0900 0200 0300 11" + " 00" * 34, BAD_LENGTH),
+        ("23 0100 0900 0200 0300 01 40 ff", BAD_LENGTH),
+        ("21 0100 0900 0200", OK),
+        ("22 0100 0900 0200 0300 00", OK),
     ],
 )
 def test_foreign_and_malformed_packets_with_a_right_checksum(head, status):
@@ -564,7 +552,7 @@ def test_kinds_survive_the_radio(valleys_and_peaks):
 def test_compiled_kernels_equal_the_plain_functions(pairs):
     packet = features(*pairs)
     assert packet.tolist() == features(*pairs, encode=encode_features.py_func).tolist()
-    header, plain_header = np.zeros(5, np.int64), np.zeros(5, np.int64)
+    header, plain_header = np.zeros(6, np.int64), np.zeros(6, np.int64)
     assert decode(packet, packet.size, header) == decode.py_func(packet, packet.size, plain_header)
     assert header.tolist() == plain_header.tolist()
     assert crc16(packet, packet.size) == crc16.py_func(packet, packet.size)
@@ -579,22 +567,22 @@ WITHOUT_JIT = """
 import numpy as np
 from swarmscope.onboard.sharing import message as m
 generator = np.random.default_rng(5)
-out, header, a, d = np.zeros(138, np.uint8), np.zeros(5, np.int64), np.zeros(16), np.zeros(16)
+out, header, a, d = np.zeros(140, np.uint8), np.zeros(6, np.int64), np.zeros(16), np.zeros(16)
 for _ in range(100):
     n = int(generator.integers(0, 17))
     angles, distances = generator.uniform(-9, 9, n), generator.uniform(-1, 7, n)
     if n > 3:
         angles[0], angles[1], distances[2], distances[3] = np.nan, np.inf, np.nan, np.inf
     for length in (
-        m.encode_features(m.Head(70000, 65535, n), angles, distances, n, 5.0, out),
-        m.encode_exact_features(m.Head(n, n, n), angles, distances, n, out),
-        m.encode_request(n, 65535, out),
+        m.encode_features(m.Head(70000, 65535 - n, 65535, n), angles, distances, n, 5.0, out),
+        m.encode_exact_features(m.Head(n, n, n, n), angles, distances, n, out),
+        m.encode_request(m.Head(n, n, 65535, 0), out),
     ):
         print(out.tobytes().hex(), m.decode(out, length, header), header.tolist())
         print(m.read_features(out, length, 5.0, a, d), a.tolist(), d.tolist())
     out[int(generator.integers(0, 7))] ^= 255
-    print(m.decode(out, 7, header), m.quantise_features(angles, distances, n, 5.0))
-    print(angles.tolist(), distances.tolist(), m.extremum_kind(distances, n, 1), bool(m.seq_newer(n, 65535)))
+    print(m.decode(out, 9, header), m.quantise_features(angles, distances, n, 5.0))
+    print(angles.tolist(), distances.tolist(), m.extremum_kind(distances, n, 1), m.name_of(n, 65535))
 """
 
 
@@ -613,11 +601,11 @@ def test_whole_codec_gives_the_same_without_the_compiler():
 
 
 def test_message_packs_and_unpacks():
-    sent = FeatureMessage(3, 65535, 9, (math.pi, math.pi / 2.0), (RANGE, 1.0))
+    sent = FeatureMessage(3, 12, 65535, 9, (math.pi, math.pi / 2.0), (RANGE, 1.0))
     packet = sent.pack(RANGE)
-    assert len(packet) == 14
+    assert len(packet) == 16
     assert FeatureMessage.unpack(packet, RANGE) == FeatureMessage(
-        3, 65535, 9, (math.pi / 2.0, math.pi), (1.0, RANGE)
+        3, 12, 65535, 9, (math.pi / 2.0, math.pi), (1.0, RANGE)
     )
     assert FeatureMessage.unpack(exact([1.0], [2.0]).tobytes(), RANGE).angles == (1.0,)
 
@@ -626,6 +614,7 @@ def test_message_packs_and_unpacks():
     ("changes", "words"),
     [
         ({"sender": -1}, "sender = -1"),
+        ({"boot": 70000}, "boot = 70000"),
         ({"seq": 65536}, "seq = 65536"),
         ({"reply_to": 1 << 20}, "reply_to"),
         ({"angles": (1.0,)}, "1 angles but 2 distances"),
@@ -635,7 +624,7 @@ def test_message_packs_and_unpacks():
     ],
 )
 def test_pack_says_what_does_not_fit(changes, words):
-    values = {"sender": 1, "seq": 2, "reply_to": 3, "angles": (0.0, 1.0), "distances": (1.0, 2.0)}
+    values = {"sender": 1, "boot": 9, "seq": 2, "reply_to": 3, "angles": (0.0, 1.0), "distances": (1.0, 2.0)}
     with pytest.raises(PacketError, match=words):
         FeatureMessage(**{**values, **changes}).pack(RANGE)
 
@@ -643,7 +632,7 @@ def test_pack_says_what_does_not_fit(changes, words):
 @pytest.mark.parametrize("range_max", [0.0, -1.0, math.nan, math.inf])
 def test_pack_and_unpack_need_a_range(range_max):
     with pytest.raises(PacketError, match="range_max"):
-        FeatureMessage(1, 2, 3, (), ()).pack(range_max)
+        FeatureMessage(1, 9, 2, 3, (), ()).pack(range_max)
     with pytest.raises(PacketError, match="range_max"):
         FeatureMessage.unpack(a_packet().tobytes(), range_max)
 
@@ -663,4 +652,4 @@ def test_unpack_says_what_is_wrong(packet, words):
 
 
 def test_public_limits():
-    assert (message.VERSION, MAX_FEATURES, MAX_FEATURES_BYTES, MAX_PACKET_BYTES) == (1, 16, 42, 138)
+    assert (message.VERSION, MAX_FEATURES, MAX_FEATURES_BYTES, MAX_PACKET_BYTES) == (2, 16, 44, 140)

@@ -6,6 +6,7 @@ import math
 
 from swarmscope._jit import jit, jit_paste
 from swarmscope.geometry import wrap_angle
+from swarmscope.onboard.percept import MAX_NEIGHBOURS
 from swarmscope.onboard.perception.safety import beam_of
 from swarmscope.onboard.sharing.inbox import ask, start_round
 from swarmscope.onboard.view import View
@@ -43,7 +44,7 @@ def ask_neighbours(see: View) -> None:
     """Start a round of requests to every neighbour seen now in the pass band (sigma_a, 3 sigma_a]."""
     start_round(see)
     percept, sigma = see.percept, see.margins.sigma_a
-    for k in range(percept["n_neighbours"]):
+    for k in range(min(MAX_NEIGHBOURS, percept["n_neighbours"])):
         x, y = percept["neighbour_x"][k], percept["neighbour_y"][k]
         distance = math.sqrt(x * x + y * y)
         ahead = abs(wrap_angle(math.atan2(y, x) - percept["goal_bearing"])) <= 0.5 * math.pi

@@ -7,16 +7,16 @@ import math
 from swarmscope._jit import jit
 from swarmscope.geometry import wrap_angle
 from swarmscope.onboard.network.graph import GRID_M
-from swarmscope.onboard.percept import MAX_OUTBOX, Row
-from swarmscope.onboard.sharing.inbox import ask_direction, start_round
+from swarmscope.onboard.percept import MAX_INBOX, MAX_NEIGHBOURS, MAX_OUTBOX, PEERS, Row
+from swarmscope.onboard.sharing.inbox import ask_direction, room_to_ask, start_round
 from swarmscope.onboard.sharing.message import read_latent
 from swarmscope.onboard.view import View
 
 
 @jit
 def take_latents(percept: Row, shared: Row, memory: Row) -> None:
-    """Keep this tick's answers of those who were asked and have not answered yet; drop and count others."""
-    for j in range(shared["latent_n"]):
+    """Keep this tick's answers; all are of somebody who was asked in the open round, one of each (``read_inbox``)."""
+    for j in range(min(MAX_INBOX, shared["latent_n"])):
         at = shared["latent_at"][j]
         sender = int(percept["packet"][at, 1]) | (int(percept["packet"][at, 2]) << 8)
         slot = -1
@@ -24,28 +24,27 @@ def take_latents(percept: Row, shared: Row, memory: Row) -> None:
             if memory["asked_id"][a] == sender and memory["answered"][a] == 0:
                 slot = a
         if slot < 0:
-            shared["dropped_stale"] += 1
             continue
         memory["scale"][slot] = read_latent(
             percept["packet"][at], percept["packet_length"][at], memory["latent"][slot]
         )
         memory["answered"][slot] = 1
-        shared["answers_n"] += 1
 
 
 @jit
 def ask_round(see: View, memory: Row) -> bool:
-    """Ask the neighbours in sight within GRID_M, nearest first, keeping room for the answers that we owe.
+    """Ask the neighbours in sight within GRID_M, nearest first, keeping room for answers that we owe (``room_to_ask``).
 
     Return whether anybody was asked; without room or neighbours the last round stays as it is.
     """
     percept = see.percept
-    room = MAX_OUTBOX - see.out["n_out"]
-    for q in range(see.shared["ask_n"]):
+    owed = 0
+    for q in range(min(PEERS, see.shared["ask_n"])):
         if see.shared["ask_direction"][q] >= 0:
-            room -= 1
+            owed += 1
+    room = room_to_ask(see, owed)
     n = 0
-    for k in range(percept["n_neighbours"]):
+    for k in range(min(MAX_NEIGHBOURS, percept["n_neighbours"])):
         if n >= room or not in_grid(percept, k):
             break
         if n == 0:

@@ -36,6 +36,7 @@ class FeatureMessage:
     """A FEATURES packet in the open, for tools and tests: radians in the compass frame, metres."""
 
     sender: int
+    boot: int
     seq: int
     reply_to: int
     angles: tuple[float, ...]
@@ -46,9 +47,8 @@ class FeatureMessage:
         self._check_values(range_max)
         out = np.zeros(MAX_FEATURES_BYTES, np.uint8)
         angles, distances = np.array(self.angles, np.float64), np.array(self.distances, np.float64)
-        length = encode_features(
-            Head(self.sender, self.seq, self.reply_to), angles, distances, len(angles), float(range_max), out
-        )
+        head = Head(self.sender, self.boot, self.seq, self.reply_to)
+        length = encode_features(head, angles, distances, len(angles), float(range_max), out)
         return out[:length].tobytes()
 
     @classmethod
@@ -60,17 +60,17 @@ class FeatureMessage:
         status = decode(data, data.size, header)
         if status != OK:
             raise PacketError(f"{STATUS_NAMES[status]} ({len(packet)} bytes)")
-        kind, sender, seq, reply_to, n = header.tolist()
+        kind, sender, seq, reply_to, n, boot = header.tolist()
         if not is_list(kind):
             raise PacketError("is a request, not features" if is_request(kind) else "holds a network's features")
         angles, distances = np.zeros(n), np.zeros(n)
         read_features(data, data.size, float(range_max), angles, distances)
-        return cls(sender, seq, reply_to, tuple(angles.tolist()), tuple(distances.tolist()))
+        return cls(sender, boot, seq, reply_to, tuple(angles.tolist()), tuple(distances.tolist()))
 
     def _check_values(self, range_max: float) -> None:
         """Raise PacketError for what the kernels would cut, clip or wrap silently."""
         _check_range(range_max)
-        for name in ("sender", "seq", "reply_to"):
+        for name in ("sender", "boot", "seq", "reply_to"):
             if not 0 <= getattr(self, name) <= 0xFFFF:
                 raise PacketError(f"{name} = {getattr(self, name)} is not in 0..65535")
         if len(self.angles) != len(self.distances):

@@ -1,7 +1,9 @@
 """Requests and answers: what to do with packets that came in, whom to ask, what to answer (Nav-SCOPE IV-B).
 
-Bad packets (torn, corrupt, foreign) and stale ones (replayed, older than the newest of the sender, answers
-to a question that is no longer open) are dropped and counted; nothing here raises or waits.
+Bad packets (torn, corrupt, foreign) and stale ones (replayed, unasked for, answers to a question that is no longer
+open) are dropped and counted; nothing here raises or waits. Nothing here trusts a packet either: who has not been asked
+in the present round is not listened to, nobody is answered more often than ``peers.ANSWERS_PER_S``, and requests of
+others leave room in the outbox for our own.
 """
 
 from __future__ import annotations
@@ -9,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from swarmscope._jit import jit, jit_inline, jit_inner, jit_paste
-from swarmscope.onboard.percept import MAX_OUTBOX, PEERS, Row
+from swarmscope.onboard.percept import MAX_INBOX, MAX_OUTBOX, PEERS, Row
 from swarmscope.onboard.sharing.message import (
     KIND_DIRECTED_REQUEST,
     KIND_LATENT,
@@ -22,10 +24,14 @@ from swarmscope.onboard.sharing.message import (
     encode_latent,
     encode_request,
     is_request,
+    name_of,
     read_features,
-    seq_newer,
 )
+from swarmscope.onboard.sharing.peers import may_answer, note_answer, take_request
 from swarmscope.onboard.view import View
+
+OWN_ROOM = 4
+"""So many requests of our own have room in the outbox of a tick, whatever else is in it."""
 
 
 @jit
@@ -39,21 +45,24 @@ def read_inbox(see: View) -> None:
     shared["ask_n"] = 0
     shared["latent_n"] = 0
     _forget_old_features(shared, now, see.rig.sharing.max_age_s)
-    for k in range(percept["n_packets"]):
+    for k in range(min(MAX_INBOX, percept["n_packets"])):
         data = percept["packet"][k]
         length = percept["packet_length"][k]
         if decode(data, length, header) != OK:
             shared["dropped_bad"] += 1
             continue
-        if header[1] == percept["id"] or not _is_new(shared, header[1], header[2]):
+        if header[1] == percept["id"]:
             shared["dropped_stale"] += 1
             continue
         if is_request(header[0]):
-            _note_request(shared, header)
+            if not _note_request(see, header):
+                shared["dropped_stale"] += 1
             continue
-        if header[3] != shared["asked_seq"] or now - shared["asked_s"] > see.rig.sharing.max_age_s:
+        if not _is_wanted(see, header):
             shared["dropped_stale"] += 1
             continue
+        note_answer(see, header)
+        shared["answers_n"] += 1
         if header[0] == KIND_LATENT:
             shared["latent_at"][shared["latent_n"]] = k
             shared["latent_n"] += 1
@@ -72,33 +81,38 @@ def _forget_old_features(shared: Row, now: float, max_age_s: float) -> None:
 
 
 @jit_inner
-def _note_request(shared: Row, header: np.ndarray) -> None:
-    """Note who asks for our features, and in which direction."""
-    if shared["ask_n"] < PEERS:
-        directed = header[0] == KIND_DIRECTED_REQUEST
-        shared["ask_direction"][shared["ask_n"]] = header[4] if directed else -1
-        shared["ask_id"][shared["ask_n"]] = header[1]
-        shared["ask_seq"][shared["ask_n"]] = header[2]
-        shared["ask_n"] += 1
+def _note_request(see: View, header: np.ndarray) -> bool:
+    """Note who asks for our features, and in which direction; return whether it is answered."""
+    shared = see.shared
+    slot = take_request(see, header)
+    if slot < 0:
+        return False
+    q = 0
+    while q < shared["ask_n"] and shared["ask_id"][q] != header[1]:
+        q += 1
+    if q == shared["ask_n"]:
+        if q >= PEERS or not may_answer(see, slot):
+            return False
+        shared["ask_n"] = q + 1
+    shared["ask_direction"][q] = header[4] if header[0] == KIND_DIRECTED_REQUEST else -1
+    shared["ask_id"][q] = header[1]
+    shared["ask_name"][q] = name_of(header[5], header[2])
+    return True
 
 
 @jit_inner
-def _is_new(shared: Row, sender: int, seq: int) -> bool:
-    """Tell whether ``seq`` is newer than everything accepted from ``sender``, and note it."""
-    slot = -1
-    for p in range(PEERS):
-        if shared["last_seq_id"][p] == sender:
-            if not seq_newer(seq, shared["last_seq"][p]):
-                return False
-            slot = p
-            break
-        if slot < 0 and shared["last_seq_id"][p] < 0:
-            slot = p
-    if slot < 0:
-        slot = sender % PEERS
-    shared["last_seq_id"][slot] = sender
-    shared["last_seq"][slot] = seq
-    return True
+def _is_wanted(see: View, header: np.ndarray) -> bool:
+    """Tell whether an answer is one to the present round of somebody who has not answered it yet, and note that."""
+    percept, shared = see.percept, see.shared
+    if shared["asked_seq"] < 0 or percept["now_s"] - shared["asked_s"] > see.rig.sharing.max_age_s:
+        return False
+    if header[3] != name_of(percept["boot"], shared["asked_seq"]):
+        return False
+    for a in range(min(MAX_OUTBOX, shared["asked_n"])):
+        if shared["asked_id"][a] == header[1] and shared["asked_done"][a] == 0:
+            shared["asked_done"][a] = 1
+            return True
+    return False
 
 
 @jit_inner
@@ -119,7 +133,6 @@ def _remember(shared: Row, sender: int, count: int, angles: np.ndarray, distance
     shared["heard_id"][slot] = sender
     shared["heard_s"][slot] = shared["asked_s"]
     shared["heard_n"][slot] = count
-    shared["answers_n"] += 1
     for j in range(count):
         shared["heard_angle"][slot, j] = angles[j]
         shared["heard_distance"][slot, j] = distances[j]
@@ -138,32 +151,65 @@ def start_round(see: View) -> None:
 
 @jit
 def ask(see: View, peer: int) -> None:
-    """Put a request to ``peer`` of the current round into the outbox (left out when that is full)."""
-    k = see.out["n_out"]
-    if k >= MAX_OUTBOX:
+    """Put a request to ``peer`` of the current round into the outbox (left out when our own requests fill it)."""
+    k = _room_to_ask(see)
+    if k < 0:
         return
-    see.out["out_length"][k] = encode_request(see.percept["id"], see.shared["asked_seq"], see.out["out"][k])
-    _asked(see, peer)
+    see.out["out_length"][k] = encode_request(_request_head(see), see.out["out"][k])
+    _asked(see, k, peer)
 
 
 @jit
 def ask_direction(see: View, peer: int, direction: float) -> None:
-    """Ask ``peer`` what it sees in ``direction`` [rad, compass frame] (left out when the outbox is full)."""
-    k = see.out["n_out"]
-    if k >= MAX_OUTBOX:
+    """Ask ``peer`` what it sees in ``direction`` [rad, compass frame]; as ``ask``."""
+    k = _room_to_ask(see)
+    if k < 0:
         return
-    see.out["out_length"][k] = encode_directed_request(
-        see.percept["id"], see.shared["asked_seq"], direction, see.out["out"][k]
-    )
-    _asked(see, peer)
+    see.out["out_length"][k] = encode_directed_request(_request_head(see), direction, see.out["out"][k])
+    _asked(see, k, peer)
+
+
+@jit
+def room_to_ask(see: View, owed: int) -> int:
+    """Return how many can be asked in this tick so that ``owed`` answers have room, too, or half of the outbox each."""
+    room = MAX_OUTBOX - min(MAX_OUTBOX, max(0, see.out["n_out"]))
+    return int(max(room - owed, min(room, OWN_ROOM)))
 
 
 @jit_inner
-def _asked(see: View, peer: int) -> None:
-    """Close the request that was written last."""
-    see.out["out_to"][see.out["n_out"]] = peer
-    see.out["n_out"] += 1
-    see.shared["asked_n"] += 1
+def _room_to_ask(see: View) -> int:
+    """Return the place of our next request in the outbox, -1 if there is none.
+
+    When the outbox is full, and ``OWN_ROOM`` of our requests are not in it, the last answer gives way.
+    """
+    if see.shared["asked_n"] >= MAX_OUTBOX:
+        return -1
+    n = int(see.out["n_out"])
+    if n < MAX_OUTBOX:
+        return n
+    own, answer = 0, -1
+    for k in range(MAX_OUTBOX):
+        if is_request(see.out["out"][k, 0]):
+            own += 1
+        else:
+            answer = k
+    return answer if own < OWN_ROOM else -1
+
+
+@jit_inner
+def _request_head(see: View) -> Head:
+    """Return the head of the present round's requests."""
+    return Head(see.percept["id"], see.percept["boot"], see.shared["asked_seq"], 0)
+
+
+@jit_inner
+def _asked(see: View, k: int, peer: int) -> None:
+    """Close the request that was written to place ``k`` of the outbox."""
+    shared, out = see.shared, see.out
+    out["out_to"][k] = peer
+    out["n_out"] = max(out["n_out"], k + 1)
+    shared["asked_id"][shared["asked_n"]], shared["asked_done"][shared["asked_n"]] = peer, 0
+    shared["asked_n"] += 1
 
 
 @jit_inner
@@ -172,14 +218,14 @@ def _answer_head(see: View, q: int) -> Head:
     shared = see.shared
     shared["seq"] = (shared["seq"] + 1) & 0xFFFF
     see.out["out_to"][see.out["n_out"]] = shared["ask_id"][q]
-    return Head(see.percept["id"], shared["seq"], shared["ask_seq"][q])
+    return Head(see.percept["id"], see.percept["boot"], shared["seq"], shared["ask_name"][q])
 
 
 @jit
 def answer_directed(see: View, q: int, codes: np.ndarray, scale_code: int) -> None:
     """Answer the ``q``-th of those who ask with a network's features ``codes (128,)`` uint8."""
     k = see.out["n_out"]
-    if k >= MAX_OUTBOX:
+    if k >= MAX_OUTBOX or q < 0 or q >= PEERS:
         return
     head = _answer_head(see, q)
     see.out["out_length"][k] = encode_latent(head, codes, scale_code, see.out["out"][k])
@@ -190,7 +236,7 @@ def answer_directed(see: View, q: int, codes: np.ndarray, scale_code: int) -> No
 def answer_all(see: View, count: int) -> None:
     """Answer everybody who asked with our ``count`` features ``see.own``."""
     own = see.own
-    for q in range(see.shared["ask_n"]):
+    for q in range(min(PEERS, see.shared["ask_n"])):
         k = see.out["n_out"]
         if k >= MAX_OUTBOX:
             return

@@ -1,4 +1,4 @@
-"""Features to bytes and back: the packets that robots exchange, version 1 (see ``docs/message.md``).
+"""Features to bytes and back: the packets that robots exchange, version 2 (see ``docs/message.md``).
 
 A robot asks (REQUEST) and its neighbour answers with the extrema of its scan (FEATURES): directions in the
 compass frame (0 = east, counter-clockwise), distances in [0, range_max]. Or it asks for a network's view of a
@@ -30,7 +30,7 @@ from swarmscope.onboard.sharing.codes import (
     turns,
 )
 
-VERSION = 1
+VERSION = 2
 KIND_REQUEST = 1
 KIND_FEATURES = 2
 KIND_EXACT_FEATURES = 3
@@ -39,14 +39,16 @@ KIND_DIRECTED_REQUEST = 4
 """A request that says in which direction the asker wants to go."""
 KIND_LATENT = 5
 """A network's features of what the sender sees in that direction, a byte each."""
+SEALED = 8
+"""Kinds from here on are kept for the same packets with a tag instead of the checksum; nobody reads them yet."""
 
 MAX_FEATURES = 16
-REQUEST_BYTES = 7
-DIRECTED_REQUEST_BYTES = 8
-MAX_FEATURES_BYTES = 42
-"""The longest packet that robots send in earnest: ``10 + 2 * MAX_FEATURES``."""
-MAX_PACKET_BYTES = 138
-"""Room that any packet fits into: an exact one has ``10 + 8 * MAX_FEATURES`` bytes, a latent one always that many."""
+REQUEST_BYTES = 9
+DIRECTED_REQUEST_BYTES = 10
+MAX_FEATURES_BYTES = 44
+"""The longest packet that robots send in earnest: ``12 + 2 * MAX_FEATURES``."""
+MAX_PACKET_BYTES = 140
+"""Room that any packet fits into: an exact one has ``12 + 8 * MAX_FEATURES`` bytes, a latent one always that many."""
 LATENT_FEATURES = 128
 """Features in a LATENT packet, always all of them."""
 
@@ -58,28 +60,34 @@ BAD_LENGTH = 4
 BAD_CHECKSUM = 5
 STATUS_NAMES = ("ok", "too short", "bad version", "bad kind", "bad length", "bad checksum")
 
-HEADER_FIELDS = ("kind", "sender", "seq", "reply_to", "n")
+HEADER_FIELDS = ("kind", "sender", "seq", "reply_to", "n", "boot")
 """What ``decode`` fills in, in this order; -1 where the packet has no such field.
 
 ``n`` is the number of features; of a DIRECTED_REQUEST the code of its direction, of a LATENT that of its scale."""
 
-_HEAD = 8
+_PLAIN = 7
+"""Bytes that every packet starts with: version and kind, sender, boot, seq."""
+_HEAD = 10
 """Bytes before the angles of a features packet."""
 _LONGEST = 3e38
 
 
 class Head(NamedTuple):
-    """Who answers whom: addresses and sequence numbers of 16 bits."""
+    """Who sends, and what is answered: numbers of 16 bits."""
 
     sender: int
+    boot: int
+    """Drawn anew whenever the sender starts."""
     seq: int
+    """The sender's counter."""
     reply_to: int
+    """``name_of`` the request that is answered; requests do not have it."""
 
 
-@jit
-def seq_newer(a: int, b: int) -> bool:
-    """Tell whether the 16-bit sequence number ``a`` comes after ``b``, wrap-around included (RFC 1982)."""
-    return 0 < ((a - b) & 0xFFFF) < 0x8000
+@jit_inline
+def name_of(boot: int, seq: int) -> int:
+    """Return what answers call the request that its sender numbered ``seq`` in its life ``boot``."""
+    return (boot ^ seq) & 0xFFFF
 
 
 @jit_inline
@@ -89,40 +97,41 @@ def _usable(n: int, angles: np.ndarray, distances: np.ndarray) -> int:
 
 
 @jit_inline
-def _put_head(out: np.ndarray, kind: int, sender: int, seq: int) -> None:
-    """Write the five bytes that every packet starts with."""
+def _put_head(out: np.ndarray, kind: int, head: Head) -> None:
+    """Write the seven bytes that every packet starts with."""
     out[0] = (VERSION << 4) | kind
-    put_u16(out, 1, sender)
-    put_u16(out, 3, seq)
+    put_u16(out, 1, head.sender)
+    put_u16(out, 3, head.boot)
+    put_u16(out, 5, head.seq)
 
 
 @jit_inline
 def _put_answer_head(out: np.ndarray, kind: int, head: Head) -> None:
-    """Write the seven bytes that every answer starts with."""
-    _put_head(out, kind, head.sender, head.seq)
-    put_u16(out, 5, head.reply_to)
+    """Write the nine bytes that every answer starts with."""
+    _put_head(out, kind, head)
+    put_u16(out, _PLAIN, head.reply_to)
 
 
 @jit
-def encode_request(sender: int, seq: int, out: np.ndarray) -> int:
+def encode_request(head: Head, out: np.ndarray) -> int:
     """Write a REQUEST into ``out`` uint8; return its length (0 when ``out`` is too small)."""
     if out.size < REQUEST_BYTES:
         return 0
-    _put_head(out, KIND_REQUEST, sender, seq)
-    return put_checksum(out, REQUEST_BYTES - 2)
+    _put_head(out, KIND_REQUEST, head)
+    return put_checksum(out, _PLAIN)
 
 
 @jit
-def encode_directed_request(sender: int, seq: int, direction: float, out: np.ndarray) -> int:
+def encode_directed_request(head: Head, direction: float, out: np.ndarray) -> int:
     """Write a DIRECTED_REQUEST into ``out`` uint8; return its length (0 when ``out`` is too small).
 
     ``direction`` [rad, compass frame] travels as the nearest of 256; NaN and infinity as 0.
     """
     if out.size < DIRECTED_REQUEST_BYTES:
         return 0
-    _put_head(out, KIND_DIRECTED_REQUEST, sender, seq)
-    out[5] = angle_code(direction)
-    return put_checksum(out, DIRECTED_REQUEST_BYTES - 2)
+    _put_head(out, KIND_DIRECTED_REQUEST, head)
+    out[_PLAIN] = angle_code(direction)
+    return put_checksum(out, _PLAIN + 1)
 
 
 @jit
@@ -141,7 +150,7 @@ def encode_latent(head: Head, codes: np.ndarray, scale_code: int, out: np.ndarra
     if out.size < MAX_PACKET_BYTES or codes.size < LATENT_FEATURES:
         return 0
     _put_answer_head(out, KIND_LATENT, head)
-    out[7] = scale_code & 0xFF
+    out[_HEAD - 1] = scale_code & 0xFF
     for k in range(LATENT_FEATURES):
         out[_HEAD + k] = codes[k]
     return put_checksum(out, _HEAD + LATENT_FEATURES)
@@ -159,14 +168,14 @@ def read_latent(data: np.ndarray, length: int, codes: np.ndarray) -> int:
         return -1
     for k in range(LATENT_FEATURES):
         codes[k] = data[_HEAD + k]
-    return int(data[7])
+    return int(data[_HEAD - 1])
 
 
 @jit
 def encode_features(
     head: Head, angles: np.ndarray, distances: np.ndarray, n: int, range_max: float, out: np.ndarray
 ) -> int:
-    """Write FEATURES into ``out`` uint8; return the length, ``10 + 2 n`` (0 when ``out`` is too small).
+    """Write FEATURES into ``out`` uint8; return the length, ``12 + 2 n`` (0 when ``out`` is too small).
 
     ``angles`` [rad, compass frame] may be in any order and are left as they are; they travel sorted. Of more
     than ``MAX_FEATURES`` the first are sent. Distances are clipped to [0, range_max]; NaN is sent as 0.
@@ -175,7 +184,7 @@ def encode_features(
     if out.size < _HEAD + 2 * n + 2:
         return 0
     _put_answer_head(out, KIND_FEATURES, head)
-    out[7] = n
+    out[_HEAD - 1] = n
     angle_codes, distance_codes = out[_HEAD : _HEAD + n], out[_HEAD + n : _HEAD + 2 * n]
     for k in range(n):
         distance = distance_code(distances[k], range_max)
@@ -185,7 +194,7 @@ def encode_features(
 
 @jit
 def encode_exact_features(head: Head, angles: np.ndarray, distances: np.ndarray, n: int, out: np.ndarray) -> int:
-    """Write the features as float32 pairs, ``10 + 8 n`` bytes: for measuring what quantisation costs.
+    """Write the features as float32 pairs, ``12 + 8 n`` bytes: for measuring what quantisation costs.
 
     As ``encode_features``, except that ``read_features`` clips the distances and sorts.
     """
@@ -193,7 +202,7 @@ def encode_exact_features(head: Head, angles: np.ndarray, distances: np.ndarray,
     if out.size < _HEAD + 8 * n + 2:
         return 0
     _put_answer_head(out, KIND_EXACT_FEATURES, head)
-    out[7] = n
+    out[_HEAD - 1] = n
     for k in range(n):
         distance = distances[k] if distances[k] > 0.0 else 0.0
         put_f32(out, _HEAD + 4 * k, turns(angles[k]) * TWO_PI)
@@ -239,7 +248,7 @@ def _check(data: np.ndarray, length: int) -> int:
         return BAD_KIND
     if not is_request(first) and length < _HEAD + 2:
         return TOO_SHORT
-    n = int(data[7]) if is_list(kind) else 0
+    n = int(data[_HEAD - 1]) if is_list(kind) else 0
     if n > MAX_FEATURES or length != _packet_bytes(kind, n):
         return BAD_LENGTH
     return OK if crc16(data, length - 2, CRC_INIT) == get_u16(data, length - 2) else BAD_CHECKSUM
@@ -249,20 +258,21 @@ def _check(data: np.ndarray, length: int) -> int:
 def decode(data: np.ndarray, length: int, header: np.ndarray) -> int:
     """Check the packet in the first ``length`` bytes of ``data`` uint8; return a status (``STATUS_NAMES``).
 
-    ``header (5,) int64`` receives ``HEADER_FIELDS``; all are -1 unless the status is ``OK``.
+    ``header (6,) int64`` receives ``HEADER_FIELDS``; all are -1 unless the status is ``OK``.
     """
-    for i in range(5):
+    for i in range(min(6, header.size)):
         header[i] = -1
     status = _check(data, length)
-    if status == OK:
+    if status == OK and header.size >= 6:
         header[0] = int(data[0]) & 0xF
         header[1] = get_u16(data, 1)
-        header[2] = get_u16(data, 3)
+        header[5] = get_u16(data, 3)
+        header[2] = get_u16(data, 5)
         if header[0] == KIND_DIRECTED_REQUEST:
-            header[4] = int(data[5])
+            header[4] = int(data[_PLAIN])
         elif header[0] != KIND_REQUEST:
-            header[3] = get_u16(data, 5)
-            header[4] = int(data[7])
+            header[3] = get_u16(data, _PLAIN)
+            header[4] = int(data[_HEAD - 1])
     return status
 
 
@@ -279,7 +289,7 @@ def read_features(
     kind = int(data[0]) & 0xF
     if not is_list(kind):
         return 0
-    sent = int(data[7])
+    sent = int(data[_HEAD - 1])
     if length != _packet_bytes(kind, sent):
         return 0
     n = _usable(sent, angles, distances)
