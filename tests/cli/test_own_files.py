@@ -15,7 +15,7 @@ from swarmscope import Body, Lidar, Robot, load_run
 from swarmscope.errors import InputFileError
 from swarmscope.judging.run_folder import RUN_FILES, read_config, read_metrics
 
-SHORT = ["--robots", 2, "--limit", 1, "--set", "lidar.beams=60"]
+SHORT = ["--robots", 2, "--limit", 1, "--set", "lidar.beams=90"]
 EXPERIMENT = {
     "name": "mine",
     "title": "Mine",
@@ -175,4 +175,4 @@ def test_what_is_wrong_with_a_decision_is_said_in_a_line(tmp_path, monkeypatch, 
     assert "mine.py: " in message and said in message
     assert len(message) < 400
     with pytest.raises(InputFileError, match="mine"):
-        Robot("mine.py", Body(), Lidar(60), address=1).warm_up()
+        Robot("mine.py", Body(), Lidar(90), address=1).warm_up()

@@ -27,7 +27,7 @@ EXPERIMENT = {
     "name": "mine",
     "title": "Two planners of mine",
     "seeds": "1000-1001",
-    "scenario": {"robots": 2, "limit_s": 1.0, "lidar": {"beams": 36}},
+    "scenario": {"robots": 2, "limit_s": 1.0, "lidar": {"beams": 90}},
     "places": {"near": {"task": {"name": "T1", "options": {"size_m": 5.0}}}},
     "planners": {"one": {"planner": {"name": "one.py"}}, "two": {"planner": {"name": "two.py"}}},
 }

@@ -141,9 +141,9 @@ def test_robots_that_collided_are_counted_and_named():
 
 BLOCKED = place_scenario(
     [(0.0, 0.0, 0.0), (-1.0, 3.0, 0.0)], [(8.0, 0.0), (-1.0, 3.0)], [wall((4.0, -4.0), (4.0, 2.0))],
-    lidar={"beams": 120}, limit_s=60.0,
+    lidar={"beams": 120}, safety={"speed_step_mps": 0}, limit_s=60.0,
 )  # fmt: skip
-"""Robot 0 passes a wall, whose nearer end is on the left; robot 1 stands at its goal."""
+"""Robot 0 passes a wall, whose nearer end is on the left, by one decision; robot 1 stands at its goal."""
 
 
 def figures_of(params, **values):

@@ -69,7 +69,7 @@ def test_both_are_listed(site):
 
 def test_both_run_by_their_names(site, tmp_path):
     words = ["run", "--task", "ring", "--planner", "go-straight", "--robots", "2", "--limit", "2", "--no-pictures"]
-    done = command("-m", "swarmscope", *words, "--set", "lidar.beams=60", "--out", "out", path=site, folder=tmp_path)
+    done = command("-m", "swarmscope", *words, "--set", "lidar.beams=90", "--out", "out", path=site, folder=tmp_path)
     assert done.returncode == 0, done.stderr
     about = json.loads((tmp_path / "out" / "metrics.json").read_text(encoding="utf-8"))["run"]
     assert (about["task"], about["planner"]) == ("ring", "go-straight")

@@ -83,7 +83,7 @@ def test_few_states_of_a_file_are_kept(tmp_path):
 @pytest.mark.skipif("NUMBA_DISABLE_JIT" in os.environ, reason="needs compiled kernels")
 def test_editing_a_planner_compiles_its_own_kernels_only(tmp_path):
     def run(planner):
-        return simulate("swap", planner=str(planner), robots=2, progress=False, limit_s=1.0, lidar__beams=60)
+        return simulate("swap", planner=str(planner), robots=2, progress=False, limit_s=1.0, lidar__beams=90)
 
     for name in ("one", "two"):
         (tmp_path / f"{name}.py").write_text(Template(PLANNER).substitute(name=name, label=name))

@@ -18,6 +18,7 @@ from swarmscope.onboard.body import Body
 from swarmscope.onboard.lidar import Lidar
 from swarmscope.onboard.planners import planner_names
 from swarmscope.onboard.robot import Robot, Seen
+from swarmscope.onboard.sharing.message import MAX_PACKET_BYTES
 
 NAN, INF = math.nan, math.inf
 
@@ -223,7 +224,8 @@ def test_strange_addresses_among_the_neighbours():
 
 
 BAD_INBOXES = [
-    5, Hostile(), [None], [5], ["text"], [b""], [bytes(139)], [bytes(10**6)], [np.zeros(3)], [[]], {1: 2},
+    5, Hostile(), [None], [5], ["text"], [b""], [bytes(MAX_PACKET_BYTES + 1)], [bytes(10**6)], [np.zeros(3)], [[]],
+    {1: 2},
     [np.zeros((2, 2), np.uint8)], [Hostile()], [(1, 2, 3)], [(1, None)], [memoryview(np.zeros((40, 40), np.uint8))],
 ]  # fmt: skip
 

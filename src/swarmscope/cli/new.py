@@ -132,7 +132,7 @@ def run(*obstacles):
     """Let one robot drive 3 m."""
     world = {"obstacles": list(obstacles), "bounds": [-5, -5, 5, 5]}
     place = {"world": world, "starts": [[0, 0, 0]], "goals": [[3, 0]]}
-    scenario = {"place": place, "lidar": {"beams": 60}, "limit_s": 15}
+    scenario = {"place": place, "limit_s": 15}
     return simulate(scenario, planner=FILE, robots=1, progress=False).metrics
 
 

@@ -127,6 +127,8 @@ SHARED = np.dtype(
         ("dropped_stale", np.int64),  # old, replayed or unasked-for packets
         ("started", np.uint8),
         ("compass", np.float64),  # of the last tick
+        ("goal_x", np.float64),  # body frame of the last tick [m]
+        ("goal_y", np.float64),
         # own displacement since the start, by odometry and compass (drifts; never a global position)
         ("x", np.float64),
         ("y", np.float64),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -48,8 +49,10 @@ class Safety(NamedTuple):
     margin_m: float = 0.04
     narrow_m: float = 1.2
     """How far ahead a gap must be free that the body just fits."""
+    slow_mps: float = 0.5
+    """At lower speeds margins are those of this one: they would open ways that close as soon as the robot speeds up."""
     speed_step_mps: float = 0.125
-    """Margins follow the present speed in steps of this; 0: they are those of the top speed, as printed."""
+    """Above it margins follow the present speed in steps of this; 0: they are those of the top speed, as printed."""
 
 
 class Sharing(NamedTuple):
@@ -63,6 +66,10 @@ class Sharing(NamedTuple):
 
 MOST_LEVELS = 32
 """Levels of speed, 5 kB of tables each."""
+LEAST_MPS = 0.01
+"""Margins of a robot that stands."""
+ROUNDING = 1.000001
+"""A speed that is above a level by less than this factor belongs to it."""
 GUARDING, SAFETY, SHARING = Guarding(), Safety(), Sharing()
 
 
@@ -72,8 +79,10 @@ class Rig(NamedTuple):
     body: Body
     protection: Protection
     """At the top speed."""
+    level_mps: np.ndarray
+    """(L,): the levels of speed, the top speed last."""
     margins: np.ndarray
-    """(L, 7): the same at each level of speed, a row each."""
+    """(L, 7): the protection model at each of them, a row each."""
     sensor: Sensor
     half: int
     """alpha/2 in beams."""
@@ -105,7 +114,8 @@ def make_rig(
     angles = sensor.angle_min + sensor.increment * np.arange(sensor.beams)
     footprint = body.radius_m + guarding.footprint_clearance_m
     half = window_half(protection.alpha, sensor.increment)
-    levels = [protection_model(slower) for slower in _slower(body, safety.speed_step_mps)]
+    slower = _slower(body, safety)
+    levels = [protection_model(one) for one in slower]
     reach = [
         [reach_table(sensor.increment, sensor.range_max, footprint, rule) for rule in rules]
         for rules in (_rules(body, level, protection, safety) for level in levels)
@@ -113,6 +123,7 @@ def make_rig(
     return Rig(
         body=body,
         protection=protection,
+        level_mps=ROUNDING * np.array([one.v_max_mps for one in slower]),
         margins=np.array(levels),
         sensor=sensor,
         half=half,
@@ -133,7 +144,7 @@ def level_of(speed: float, rig: Rig) -> int:
     """Return the lowest level of speed that is not below ``speed`` [m/s]."""
     levels = len(rig.reach)
     for k in range(levels - 1):
-        if speed * levels <= rig.body.v_max_mps * (k + 1.000001):
+        if speed <= rig.level_mps[k]:
             return k
     return levels - 1
 
@@ -145,12 +156,15 @@ def margins_at(level: int, rig: Rig) -> Protection:
     return Protection(m[0], m[1], m[2], m[3], m[4], m[5], m[6])
 
 
-def _slower(body: Body, step: float) -> list[Body]:
-    """Return the data sheet at each level of speed, ``step`` [m/s] apart, the top speed last."""
-    levels = min(MOST_LEVELS, max(1, round(body.v_max_mps / step))) if step > 0.0 else 1
+def _slower(body: Body, safety: Safety) -> list[Body]:
+    """Return the data sheet at each level of speed, the top speed last."""
+    above, step = body.v_max_mps - safety.slow_mps, safety.speed_step_mps
+    if not (above > 0.0 and step > 0.0):
+        return [body]
+    steps = min(MOST_LEVELS - 1, math.ceil(above / step - 1e-6))
+    speeds = [max(safety.slow_mps, LEAST_MPS) + above * k / steps for k in range(steps)]
     width = min(body.half_width_m, body.radius_m)
-    slower = [body._replace(v_max_mps=body.v_max_mps * k / levels, half_width_m=width) for k in range(1, levels)]
-    return [*slower, body]
+    return [*(body._replace(v_max_mps=speed, half_width_m=width) for speed in speeds), body]
 
 
 def _resolved(guarding: Guarding, body: Body) -> Guarding:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from swarmscope._jit import jit, jit_paste
 from swarmscope.onboard.control.guard import guard
+from swarmscope.onboard.perception.bearings import steady
 from swarmscope.onboard.perception.features import align_features, extrema
 from swarmscope.onboard.perception.filters import filter_padded, prepare_scan
 from swarmscope.onboard.perception.mend import mend
@@ -25,6 +26,7 @@ def perceive(see: View, still_s: float) -> None:
     """
     see.out["n_out"] = 0
     see.out["fused"] = 0
+    steady(see.percept, see.shared)
     dx, dy = update_odometry(see.percept, see.shared)
     read_inbox(see)
     update_tracks(see.percept, see.shared, see.rig, dx, dy)

@@ -111,8 +111,8 @@ class GuardModel(_Strict):
     thinnest_m: NotNegative = GUARDING.thinnest_m
     """Width of the narrowest thing that must not be missed between two beams: robots drive no faster than they can stop
     short of it; 0 asks for nothing [m]."""
-    others_mps: NotNegative | None = None
-    """How fast others may be; without it as fast as these robots, 0: nothing else moves [m/s]."""
+    others_mps: Annotated[float, Field(ge=-1.0, allow_inf_nan=False)] = GUARDING.others_mps
+    """How fast others may be; below 0: as fast as these robots, 0: nothing else moves [m/s]."""
     others_yield: bool = GUARDING.others_yield
     """Whether others run the same guard; before those that do not, a robot stands before they can reach it."""
 
@@ -128,8 +128,10 @@ class SafetyModel(_Strict):
     """Kept on both sides of the body within ``look_ahead_m`` [m]."""
     narrow_m: NotNegative = SAFETY.narrow_m
     """How far ahead a gap must be free that the body just fits, when no direction is safe; 0 is r [m]."""
+    slow_mps: NotNegative = SAFETY.slow_mps
+    """At lower speeds margins (18), (2) are those of this speed [m/s]."""
     speed_step_mps: NotNegative = SAFETY.speed_step_mps
-    """Margins (18), (2) follow the present speed in steps of this; 0: those of the top speed, as printed [m/s]."""
+    """Above it they follow the present speed in steps of this; 0: those of the top speed, as printed [m/s]."""
 
 
 class TaskModel(_Strict):

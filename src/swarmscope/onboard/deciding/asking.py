@@ -43,7 +43,7 @@ def obstacle_ahead(see: View, horizon: float) -> bool:
 def ask_neighbours(see: View) -> None:
     """Start a round of requests to every neighbour seen now in the pass band (sigma_a, 3 sigma_a]."""
     start_round(see)
-    percept, sigma = see.percept, see.margins.sigma_a
+    percept, sigma = see.percept, see.rig.protection.sigma_a
     for k in range(min(MAX_NEIGHBOURS, percept["n_neighbours"])):
         x, y = percept["neighbour_x"][k], percept["neighbour_y"][k]
         distance = math.sqrt(x * x + y * y)

@@ -226,7 +226,7 @@ def follow(see: View, memory: Row, driving: Driving) -> None:
 @jit_inner
 def _drive(see: View, heading: float, driving: Driving) -> None:
     """Ask for driving towards ``heading`` (body frame) as fast as (2) and the way left allow."""
-    view = 0.5 * see.margins.alpha
+    view = 0.5 * see.rig.protection.alpha
     allowed = safe_speed(see.scan, see.rig, heading, see.percept["dt_s"], view)
     head_for(see, heading, min(last_speed(see, driving.arrive_m), max(allowed, driving.creep)))
 

@@ -94,7 +94,7 @@ def choose_side(see: View, count: int, w_i: float, bias: float, polygon: bool) -
     """
     percept, rig, features = see.percept, see.rig, see.other
     target = percept["compass"] + percept["goal_bearing"]
-    half_alpha = 0.5 * see.margins.alpha
+    half_alpha = 0.5 * see.rig.protection.alpha
     own = see.own
     align_features(own.angles, own.distances, count, -target, features.angles, features.distances)
     _normalise_all(features.distances, count, rig.sensor.range_max)
@@ -136,7 +136,7 @@ def _opinion(see: View, t: int, target: float, w_i: float, polygon: bool) -> Opi
         return nothing
     x, y = shared["track_x"][t], shared["track_y"][t]
     distance = math.sqrt(x * x + y * y)
-    if not in_pass_band(distance, see.margins.sigma_a):
+    if not in_pass_band(distance, see.rig.protection.sigma_a):
         return nothing
     bearing = wrap_angle(math.atan2(y, x) - target)
     slot = _heard_of(shared, shared["track_id"][t])
@@ -146,11 +146,11 @@ def _opinion(see: View, t: int, target: float, w_i: float, polygon: bool) -> Opi
     heard = Table(shared["heard_angle"][slot], shared["heard_distance"][slot])
     align_features(heard.angles, heard.distances, n, -target, features.angles, features.distances)
     _normalise_all(features.distances, n, rig.sensor.range_max)
-    half_alpha, threshold = 0.5 * see.margins.alpha, normalise(see.margins.w_n, rig.sensor.range_max)
+    half_alpha, threshold = 0.5 * see.rig.protection.alpha, normalise(see.rig.protection.w_n, rig.sensor.range_max)
     x_1 = passable_distance(features.angles, features.distances, n, 0.0, half_alpha, polygon)
     x_2 = passable_distance(features.angles, features.distances, n, -half_alpha, 0.0, polygon)
     left = following_probability(x_1, x_2, threshold, bearing >= 0.0)
-    force = interaction_force(distance, see.margins.sigma_a, w_i)
+    force = interaction_force(distance, see.rig.protection.sigma_a, w_i)
     return Opinion(True, left, force, 1 if bearing >= 0.0 else -1)
 
 

@@ -50,7 +50,7 @@ class Meeting(NamedTuple):
 @jit_inner
 def _meeting(see: View, t: int, still_s: float, w_i: float) -> Meeting:
     """Return how track ``t`` meets us; a weight below 1 would let robots drive into one another."""
-    shared, sigma_a = see.shared, see.margins.sigma_a
+    shared, sigma_a = see.shared, see.rig.protection.sigma_a
     if not moves(see.percept, shared, t, still_s):
         return Meeting(False, 0.0, 0.0)
     x, y = shared["track_x"][t], shared["track_y"][t]
