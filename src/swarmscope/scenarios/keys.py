@@ -147,7 +147,7 @@ def _key(name: str, takes: str, default: Any, text: str) -> Key:
 
 def _texts(fields: Mapping[str, Any], prefix: str) -> Iterator[tuple[str, str]]:
     for name, field in fields.items():
-        yield prefix + name, (field.description or "").rstrip(".")
+        yield prefix + name, " ".join((field.description or "").split()).rstrip(".")
         kinds = [kind for kind in (field.annotation, *get_args(field.annotation)) if hasattr(kind, "model_fields")]
         for kind in kinds:
             yield from _texts(kind.model_fields, f"{prefix}{name}.")
