@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -50,7 +51,7 @@ def shut():
 
 def path_m(cells=WAY):
     points = np.vstack([START[:2], metres(cells.astype(float)), GOAL])
-    return float(sum(np.hypot(*(b - a)) for a, b in zip(points[:-1], points[1:], strict=True)))
+    return float(sum(np.hypot(*(b - a)) for a, b in pairwise(points)))
 
 
 def write_folder(folder: Path, worlds, paths=True) -> Path:
