@@ -33,7 +33,7 @@ def test_the_scenario_of_a_world_says_what_the_benchmark_says():
     assert (scenario.robots, scenario.limit_s, robot.v_max_mps, robot.a_max_mps2) == (1, 100.0, 1.5, 2.0)
     assert (robot.radius_m, robot.half_width_m, robot.sensor_delay_s) == (0.215, 0.215, 0.05)
     assert (scenario.lidar.beams, scenario.lidar.range_m, scenario.lidar.rate_hz) == (360, 5.0, 20.0)
-    assert (guard.others_mps, guard.thinnest_m) == (0.0, 0.1)
+    assert (guard.others_mps, guard.thinnest_m, scenario.safety.look_ahead_m) == (0.0, 0.1, 1.0)
 
 
 def test_the_guard_counts_on_nothing_thinner_than_what_stands_there():

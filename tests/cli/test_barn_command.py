@@ -137,8 +137,9 @@ def test_a_torn_world_file_is_named(tmp_path):
     assert f"{file}: torn, or no XML" in refused("barn", folder, "--workers", 1)
 
 
-def test_a_folder_that_cannot_be_written_is_told_before_the_work(npz, monkeypatch):
+def test_a_place_that_cannot_be_written_is_told_before_the_work(npz, monkeypatch):
     monkeypatch.setattr(barn_module, "play_all", lambda *_: pytest.fail("played"))
+    assert "is a folder" in refused("barn", npz, "--out", npz.parent)
     assert "cannot write" in refused("barn", npz, "--out", npz / "a.json")
 
 

@@ -53,7 +53,7 @@ def barn_command(
     choices = choices_of(planners, speeds)
     _check(worlds, numbers[0], choices, changes, code)
     if out is not None:
-        put_in_place(out.parent, {})  # a folder that cannot be written is told before the work
+        _check_writable(out)
     _warm_up([choice.planner for choice in choices])
     with _progress_bar(len(numbers) * len(choices)) as progress:
         runs = play_all(worlds, numbers, choices, changes, workers, progress)
@@ -76,6 +76,7 @@ def write_command(
     worlds = find_worlds(place)
     chosen(worlds.numbers, [number], 1)
     scenario = scenario_of(worlds.read(number), planners[0], speeds[0], changes)
+    _check_writable(file)
     put_in_place(file.parent, {file.name: written_out(scenario).encode()})
     print(f"{file} is there; run it:")
     print(f"  {shlex.join(['swarmscope', 'run', str(file)])}")
@@ -150,6 +151,13 @@ def _check(worlds: Worlds, number: int, choices: Sequence[Choice], changes: Sequ
     announce(files)
     for scenario in scenarios:
         planner_of(scenario.planner).check_available()
+
+
+def _check_writable(file: Path) -> None:
+    """Raise an error before the work when a file cannot be written."""
+    if file.is_dir():
+        raise ConfigError(str(file), "is a folder; name the file to write")
+    put_in_place(file.parent, {})
 
 
 def _warm_up(planners: Sequence[str]) -> None:
