@@ -73,6 +73,7 @@ def test_without_a_path_file_the_shortest_way_counts(tmp_path):
 def test_late_robots_are_named_with_the_reason(npz):
     said = play(npz, "--worlds", "4", "--set", "limit_s=3", "--workers", 1)
     assert "0 of 1" in said and "nav-scope, 2 m/s, world 4: time limit in state" in said
+    assert "nan" not in said
 
 
 def test_of_many_failures_only_the_first_are_printed(npz, monkeypatch):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import shlex
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -99,28 +100,34 @@ def print_rows(rows: Sequence[Row], title: str) -> None:
         table.add_column(word, justify="right" if k else "left", no_wrap=True)
     for row in rows:
         low, middle, high = row.quartiles_s
+        score, share = row.score, row.share
         table.add_row(
             short_name(row.planner),
             f"{row.speed_mps:g}",
             f"{row.arrived} of {row.worlds}",
-            f"{100.0 * row.share.low:.1f}-{100.0 * row.share.high:.1f} %",
+            f"{100.0 * share.low:.1f}-{100.0 * share.high:.1f} %",
             str(row.collisions),
-            f"{row.score.estimate:.4f}",
-            f"{row.score.low:.4f}-{row.score.high:.4f}",
-            f"{middle:.1f} s",
-            f"{low:.1f}-{high:.1f} s",
-            f"{row.clearance_m:.3f} m",
+            f"{score.estimate:.4f}",
+            _known("{:.4f}-{:.4f}", score.low, score.high),
+            _known("{:.1f} s", middle),
+            _known("{:.1f}-{:.1f} s", low, high),
+            _known("{:.3f} m", row.clearance_m),
         )
     PlainConsole(width=None if sys.stdout.isatty() else WIDE).print(table)
+
+
+def _known(form: str, *values: float) -> str:
+    """Return numbers in words, a dash where one is not known."""
+    return form.format(*values) if all(map(math.isfinite, values)) else "-"
 
 
 def print_pairs(pairs: Sequence[Pair]) -> None:
     """Print what planners differ by in the same worlds."""
     for pair in pairs:
         of, first, second = pair.score, short_name(pair.first), short_name(pair.second)
+        sure = _known(" ({:+.4f} to {:+.4f}, p = {:.2g})", of.low, of.high, of.p_value).removesuffix("-")
         print(
-            f"{pair.speed_mps:g} m/s, same worlds: score of {first} less {second} {of.estimate:+.4f} "
-            f"({of.low:+.4f} to {of.high:+.4f}, p = {of.p_value:.2g}); "
+            f"{pair.speed_mps:g} m/s, same worlds: score of {first} less {second} {of.estimate:+.4f}{sure}; "
             f"only {first} arrives in {pair.only_first}, only {second} in {pair.only_second}"
         )
 
