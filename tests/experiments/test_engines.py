@@ -16,6 +16,7 @@ from small_experiment import RUNS, VALUES, small
 from swarmscope.errors import ConfigError, MissingExtraError, SwarmscopeError, UnknownNameError
 from swarmscope.experiments.campaign import keyed_units, run_missing, state_of
 from swarmscope.experiments.engines import ENGINES, _retry, make_engine
+from swarmscope.experiments.engines.local import Local
 from swarmscope.experiments.store import Store
 from swarmscope.experiments.work import make_job, work, world_key
 from swarmscope.scenarios.to_kernels import complete
@@ -161,7 +162,7 @@ def test_a_job_that_kills_every_worker_is_given_up(monkeypatch):
     monkeypatch.setattr(_retry, "MOST_TRIES", 2)  # each takes the start of a process
     bad = json.dumps({"key": "bad", "world": "w", "config": {"deadly": True}})
     good = one_job()
-    answers = {json.loads(a)["key"]: json.loads(a) for a in deadly_local().answers(iter([good, bad]))}
+    answers = {json.loads(a)["key"]: json.loads(a) for a in Local(1, deadly_work).answers(iter([good, bad]))}
     assert "died, 2 times" in answers["bad"]["error"]
     assert answers[json.loads(good)["key"]].get("error") is None
 
@@ -169,21 +170,6 @@ def test_a_job_that_kills_every_worker_is_given_up(monkeypatch):
 def one_job():
     unit, key = keyed_units(small())[0]
     return make_job(key, world_key(unit.scenario), complete(unit.scenario), None)
-
-
-def deadly_local():
-    """The local engine, with work that dies of some jobs."""
-    from swarmscope.experiments.engines import local
-
-    class Deadly(local.Local):
-        def answers(self, jobs):
-            real, local.work = local.work, deadly_work
-            try:
-                yield from super().answers(jobs)
-            finally:
-                local.work = real
-
-    return Deadly(workers=1)
 
 
 def deadly_work(job):

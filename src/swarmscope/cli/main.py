@@ -157,6 +157,43 @@ def replay(
         typer.launch(page.resolve().as_uri())
 
 
+@app.command(
+    epilog="Examples:\n\n"
+    "[bold]swarmscope barn the-barn-challenge/jackal_helper/worlds/BARN --every 10[/bold]\n\n"
+    "[bold]swarmscope barn BARN_dataset --planner nav-scope --planner mine.py --speed 1 --speed 2[/bold]\n\n"
+    "[bold]swarmscope barn BARN_dataset --set safety.look_ahead_m=2 --worlds 0-49 --out barn.json[/bold]\n\n"
+    "[bold]swarmscope barn BARN_dataset --write-scenario 36 w36.yaml; swarmscope run w36.yaml[/bold]"
+)
+def barn(
+    worlds_of: Annotated[
+        Path,
+        typer.Argument(metavar="FOLDER_OR_NPZ", help="Worlds of the challenge: world_N.world, path_N.npy; or a .npz."),
+    ],
+    planner: Annotated[list[str] | None, typer.Option(help="Planner or FILE.py, else nav-scope; repeatable.")] = None,
+    speed: Annotated[list[float] | None, typer.Option(help="Highest speed, m/s, else 2; repeatable.")] = None,
+    set_: Annotated[
+        list[str] | None, typer.Option("--set", metavar="KEY.PATH=VALUE", help="Any key of a scenario; repeatable.")
+    ] = None,
+    worlds: Annotated[str | None, typer.Option(help="Numbers and ranges: 0,4,10-19; else all.")] = None,
+    every: Annotated[int, typer.Option(min=1, help="Only every so manieth world.")] = 1,
+    workers: Workers = None,
+    out: Annotated[Path | None, typer.Option(help="JSON file with every run.")] = None,
+    write_scenario: Annotated[
+        tuple[int, Path] | None,
+        typer.Option(metavar="WORLD FILE", help="Write the scenario of one world for 'swarmscope run', run nothing."),
+    ] = None,
+    no_code: NoCode = False,
+) -> None:
+    """Drive through the worlds of the BARN challenge: arrivals, scores, times, planners compared (docs/barn.md)."""
+    from swarmscope.cli.barn import barn_command, write_command
+
+    planners, speeds, changes = planner or ["nav-scope"], speed or [2.0], set_ or []
+    if write_scenario is not None:
+        write_command(worlds_of, *write_scenario, planners, speeds, changes)
+    else:
+        barn_command(worlds_of, planners, speeds, changes, worlds, every, workers, out, not no_code)
+
+
 @new.command("task", epilog="Example: [bold]swarmscope new task ring[/bold]")
 def new_task(name: OwnName) -> None:
     """Write a task of your own to begin with, and a test for it."""

@@ -7,7 +7,7 @@ import os
 import signal
 import threading
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 
@@ -19,10 +19,11 @@ AHEAD = 2
 
 
 class Local:
-    """Runs jobs in ``workers`` processes, by default one for each core."""
+    """Runs jobs in ``workers`` processes, by default one for each core; ``run`` is what it does with a job."""
 
-    def __init__(self, workers: int | None = None) -> None:
+    def __init__(self, workers: int | None = None, run: Callable[[str], str] = work) -> None:
         self.workers = workers or len(os.sched_getaffinity(0))
+        self.run = run
 
     def answers(self, jobs: Iterator[str]) -> Iterator[str]:
         """Run the jobs and return their answers."""
@@ -36,7 +37,7 @@ class Local:
                     if attempt is None:
                         break
                     try:
-                        under_way[pool.submit(work, attempt.job)] = attempt
+                        under_way[pool.submit(self.run, attempt.job)] = attempt
                     except BrokenProcessPool:
                         again.append(attempt)
                         break
