@@ -253,10 +253,10 @@ def test_an_answer_that_comes_too_late_is_dropped(model):
 
 
 def test_answers_for_another_direction_are_not_used(model):
-    for turned, heard in ((1.5, 1), (2.5, 0)):
+    for turned, heard in ((1.5, 1), (2.5, 0)):  # what is left of ten times as much in one tick
         robots = Robots(planner_of(model), turned_deg=2.0).step()
         answer = robots.exchange()
-        robots.percepts["goal_bearing"][0] += math.radians(turned)
+        robots.percepts["goal_bearing"][0] += 10.0 * math.radians(turned)
         robots.hand(0, answer).step()
         assert (robots.decisions["fused"][0], robots.decisions["heard"][0]) == (1, heard)
 
