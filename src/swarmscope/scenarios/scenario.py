@@ -22,6 +22,7 @@ from swarmscope.sim.world import WorldSpec
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
 NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+Angle = Annotated[float, Field(ge=0.0, le=45.0)]
 
 BODY: Final = Body()
 LIDAR: Final = Lidar()
@@ -72,16 +73,33 @@ class LidarModel(_Strict):
 
 
 class NoiseModel(_Strict):
-    """Sensor errors, one standard deviation each; 0 is none."""
+    """Sensor errors, standard deviations where nothing else is said; 0 is none."""
 
     range_fraction: Annotated[float, Field(ge=0.0, le=0.3)] = NOISE.range_fraction
     """Error of a LiDAR range, and of the distance to a neighbour, as a fraction of it."""
     dropout: Fraction = NOISE.dropout
     """Share of LiDAR returns that are lost."""
-    bearing_deg: Annotated[float, Field(ge=0.0, le=45.0)] = math.degrees(NOISE.bearing_rad)
+    bearing_deg: Angle = math.degrees(NOISE.bearing_rad)
     """Error of the bearing of a neighbour [°]."""
-    compass_deg: Annotated[float, Field(ge=0.0, le=45.0)] = math.degrees(NOISE.compass_rad)
+    compass_deg: Angle = math.degrees(NOISE.compass_rad)
     """Error of a robot's compass, drawn anew for every scan [°]."""
+    compass_bias_deg: Angle = math.degrees(NOISE.compass_bias_rad)
+    """Error of a robot's compass that stays the same for the whole run, beside the one drawn for every scan [°]."""
+    odometry_scale: Annotated[float, Field(ge=0.0, le=0.1)] = NOISE.odometry_scale
+    """Error of the size of a robot's wheels, the same for the whole run: of its speed and of all motion as it measures
+    them, as a fraction; it drives as it wants to."""
+    odometry_drift_m: Annotated[float, Field(ge=0.0, le=1.0)] = NOISE.odometry_drift_m
+    """Error of the place by odometry after 1 m, along and across, a random walk that grows with the root of the way
+    [m/√m]."""
+    odometry_turn_deg: Angle = math.degrees(NOISE.odometry_turn_rad)
+    """Error of the heading by odometry, in the same way; the package's planners read the compass instead [°/√m]."""
+    nan: Fraction = NOISE.nan
+    """Share of LiDAR readings that are broken (NaN), drawn anew for every scan."""
+    stuck: Fraction = NOISE.stuck
+    """Share of a robot's beams that say the longest range for the whole run, whatever is there."""
+    blind_deg: Annotated[float, Field(ge=0.0, le=360.0)] = math.degrees(NOISE.blind_rad)
+    """Width of the sector in which a robot's LiDAR finds nothing for the whole run; it lies anywhere in its field of
+    view [°]."""
 
 
 class RadioModel(_Strict):
@@ -192,7 +210,7 @@ class Scenario(_Strict):
     lidar: LidarModel = LidarModel()
     """The LiDAR."""
     noise: NoiseModel = NoiseModel()
-    """Sensor errors, one standard deviation each; 0 is none."""
+    """Sensor errors, standard deviations where nothing else is said; 0 is none."""
     radio: RadioModel = RadioModel()
     """The link between robots."""
     guard: GuardModel = GuardModel()

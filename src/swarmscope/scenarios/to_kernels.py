@@ -90,6 +90,13 @@ def _noise_of(noise: NoiseModel) -> Noise:
         dropout=noise.dropout,
         bearing_rad=math.radians(noise.bearing_deg),
         compass_rad=math.radians(noise.compass_deg),
+        compass_bias_rad=math.radians(noise.compass_bias_deg),
+        odometry_scale=noise.odometry_scale,
+        odometry_drift_m=noise.odometry_drift_m,
+        odometry_turn_rad=math.radians(noise.odometry_turn_deg),
+        nan=noise.nan,
+        stuck=noise.stuck,
+        blind_rad=math.radians(noise.blind_deg),
     )
 
 

@@ -74,7 +74,7 @@ CHOICE = np.dtype(
 
 
 class Noise(NamedTuple):
-    """Sensor errors, one standard deviation each; 0 is none."""
+    """Sensor errors, standard deviations where nothing else is said; 0 is none."""
 
     range_fraction: float = 0.0
     """Of a LiDAR range and of the distance to a neighbour, as a fraction of it."""
@@ -83,6 +83,20 @@ class Noise(NamedTuple):
     bearing_rad: float = 0.0
     """Of the bearing of a neighbour."""
     compass_rad: float = 0.0
+    compass_bias_rad: float = 0.0
+    """The same for a whole run, as all that follows but for the drift."""
+    odometry_scale: float = 0.0
+    """Of the wheels' size: of the speed and of all motion that a robot measures, as a fraction of it."""
+    odometry_drift_m: float = 0.0
+    """Of the place by odometry after 1 m, in both directions; it grows with the root of the way [m/sqrt(m)]."""
+    odometry_turn_rad: float = 0.0
+    """Of the heading by odometry, in the same way [rad/sqrt(m)]."""
+    nan: float = 0.0
+    """Share of LiDAR readings that are broken (NaN), drawn anew for every scan."""
+    stuck: float = 0.0
+    """Share of beams that say the longest range, whatever is there."""
+    blind_rad: float = 0.0
+    """Width of a sector without returns."""
 
 
 class Radio(NamedTuple):
