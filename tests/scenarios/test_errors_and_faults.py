@@ -9,6 +9,7 @@ from helpers import circle, place_scenario, run_scenario
 from swarmscope.errors import ConfigError
 from swarmscope.scenarios.read import parse_scenario
 from swarmscope.scenarios.scenario import NoiseModel
+from swarmscope.scenarios.to_kernels import make_rig_of
 
 T1 = {"task": {"name": "T1"}}
 MODERATE = {
@@ -19,6 +20,7 @@ MODERATE = {
     "noise.nan": 0.02,
     "noise.stuck": 0.02,
     "noise.blind_deg": 2.0,
+    "noise.scan_age_s": 0.05,
 }
 """Each key at a value that robots have to live with."""
 ZERO = {"noise": dict.fromkeys(NoiseModel.model_fields, 0.0)}
@@ -62,6 +64,8 @@ def digest_of(trace):
         ("noise.stuck", -0.1),
         ("noise.blind_deg", 361),
         ("noise.blind_deg", float("nan")),
+        ("noise.scan_age_s", 1.01),
+        ("noise.scan_age_s", float("nan")),
     ],
 )
 def test_values_out_of_range_are_refused_at_their_place(key, value):
@@ -86,3 +90,11 @@ def test_nobody_is_touched_in_the_forest(key):
     trace = run_scenario(T1 | {"seed": 1, "record_scans": "no", "limit_s": 60.0} | grouped({key: MODERATE[key]}))
     assert not trace.robots["crashed"].any()
     assert trace.robots["arrived"].mean() > 0.8
+
+
+def test_the_guard_counts_on_the_oldest_scan():
+    def latency(noise):
+        return make_rig_of(parse_scenario(T1 | {"noise": noise}, "test")).guarding.latency_s
+
+    assert latency({}) == 0.0
+    assert latency({"scan_age_s": 0.15}) == 0.15

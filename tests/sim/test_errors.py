@@ -194,3 +194,58 @@ def test_an_error_leaves_the_draws_of_the_others_alone(name):
     assert differ <= touches
     same = sims[0].ranges.tobytes() == sims[1].ranges.tobytes()
     assert same == (name not in ("range_fraction", "dropout", "nan", "stuck", "blind_rad"))
+
+
+def test_a_late_scan_is_from_a_random_moment_of_the_robots_own_way():
+    oldest, step, ahead = 0.5, 0.02, 180
+    sim = lonely(Noise(scan_age_s=oldest))
+    sense(sim, 0, 0, MANY)
+    assert sim.ranges[:, ahead] == pytest.approx(1.0, abs=1e-5)  # it stood
+    ages = []
+    for tick in range(1, 21):
+        sim.robots["x"] += step * math.cos(0.3)
+        sim.robots["y"] += step * math.sin(0.3)
+        sense(sim, tick, 0, MANY)
+        ages.append((sim.ranges[:, ahead] - (1.0 - step * tick)) / step * DT)
+    late = np.array(ages[3:])
+    assert late.min() > -1e-4 and late.max() < oldest + 1e-4
+    assert late.mean() == pytest.approx(oldest / 2.0, rel=0.03)
+    assert late.std() == pytest.approx(oldest / math.sqrt(12.0), rel=0.03)
+    assert abs(np.corrcoef(late[:-1].ravel(), late[1:].ravel())[0, 1]) < 0.05
+    assert np.array(ages[0]).max() < DT + 1e-4  # before the start everybody stood
+
+
+def test_a_late_scan_is_turned_and_shows_others_where_they_were_but_positioning_is_of_now():
+    oldest, ahead = 0.2, 180
+    sim, _ = place_sim([(0.0, 0.0, 0.0), (2.0, 0.0, math.pi)], noise=Noise(scan_age_s=oldest))
+    index_robots(sim)
+    sense(sim, 0, 0, 2)
+    found = []
+    for tick in range(1, 40):
+        sim.robots["x"][1] = 2.0 - 0.03 * tick
+        index_robots(sim)
+        sense(sim, tick, 0, 2)
+        assert sim.percepts["neighbour_x"][0, 0] == pytest.approx(2.0 - 0.03 * tick)
+        found.append(((sim.ranges[:, ahead] - (1.85 - 0.03 * tick)) / 0.03 * DT).tolist())
+    both = np.array(found)  # each has an age of its own
+    assert both.min() > -1e-4 and both.max() < oldest + 1e-4
+    assert both.std(axis=0).min() > 0.03
+    assert abs(np.corrcoef(both.T)[0, 1]) < 0.5
+    sim.robots["yaw"][0] += 0.4
+    sense(sim, 40, 0, 2)
+    nearest = int(np.flatnonzero(sim.ranges[0] == sim.ranges[0].min()).mean())
+    assert 180 - math.degrees(0.4) - 1.0 < nearest < 180  # turned by a part of it
+
+
+def test_whoever_comes_into_range_or_leaves_it_is_seen_where_he_was():
+    """The other is looked for among the robots that are near now."""
+    sim, _ = place_sim([(0.0, 0.0, 0.0), (5.1, 0.0, 0.0)], noise=Noise(scan_age_s=1.0), rig=rig_of())
+    index_robots(sim)
+    sense(sim, 0, 0, 2)
+    seen = []
+    for tick in range(1, 30):
+        sim.robots["x"][1] = 5.1 + 0.1 * (tick % 2)  # 5.2 m is too far
+        index_robots(sim)
+        sense(sim, tick, 0, 1)
+        seen.append((tick % 2, bool(np.isfinite(sim.ranges[0]).any())))
+    assert {out for out, there in seen if there} == {0, 1}

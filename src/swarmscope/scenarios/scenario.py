@@ -100,6 +100,9 @@ class NoiseModel(_Strict):
     blind_deg: Annotated[float, Field(ge=0.0, le=360.0)] = math.degrees(NOISE.blind_rad)
     """Width of the sector in which a robot's LiDAR finds nothing for the whole run; it lies anywhere in its field of
     view [°]."""
+    scan_age_s: Annotated[float, Field(ge=0.0, le=1.0)] = NOISE.scan_age_s
+    """Age of the oldest scan that a robot decides on: each is by a random time below this older than the decision, with
+    all that moved and turned since; the guard counts on the oldest [s]."""
 
 
 class RadioModel(_Strict):

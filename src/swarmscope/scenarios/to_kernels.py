@@ -64,7 +64,7 @@ def make_rig_of(scenario: Scenario) -> Rig:
     return make_rig(
         body,
         sensor,
-        Guarding(**guard.model_dump(exclude_none=True)),
+        Guarding(**guard.model_dump(exclude_none=True), latency_s=noise.scan_age_s),
         Safety(**safety.model_dump()),
         Sharing(exact_features=scenario.radio.exact_features),
     )
@@ -97,6 +97,7 @@ def _noise_of(noise: NoiseModel) -> Noise:
         nan=noise.nan,
         stuck=noise.stuck,
         blind_rad=math.radians(noise.blind_deg),
+        scan_age_s=noise.scan_age_s,
     )
 
 

@@ -9,6 +9,7 @@ from swarmscope.geometry import wrap_angle
 from swarmscope.onboard.percept import MAX_INBOX, MAX_NEIGHBOURS, Row
 from swarmscope.sim.cells import column_of, row_of
 from swarmscope.sim.errors import compass_error, measure_motion, spoil_scan
+from swarmscope.sim.lateness import cast_late, note_pose
 from swarmscope.sim.lidar import cast_disc, cast_static
 from swarmscope.sim.state import Sim
 from swarmscope.sim.streams import BEARING_NOISE, RANGE_NOISE, key, mix, normal
@@ -61,6 +62,9 @@ def _scan_and_neighbours(sim: Sim, tick: int, i: int) -> None:
             cast_disc(bx, by, sim.radius, sim.beams, ranges)
             found = _insert(percept, found, j, bx, by)
     _keep_visible(sim, tick, i, found)
+    if sim.noise.scan_age_s > 0.0:
+        note_pose(sim, tick, i)
+        cast_late(sim, tick, i)
     spoil_scan(sim, tick, i)
 
 

@@ -97,6 +97,8 @@ class Noise(NamedTuple):
     """Share of beams that say the longest range, whatever is there."""
     blind_rad: float = 0.0
     """Width of a sector without returns."""
+    scan_age_s: float = 0.0
+    """Age of the oldest scan when it is decided on; each has one of its own below this."""
 
 
 class Radio(NamedTuple):
@@ -169,6 +171,8 @@ class Sim(NamedTuple):
     queue_from: np.ndarray
     queue_data: np.ndarray
     path: np.ndarray
+    past: np.ndarray
+    """(K, N, 3): x, y, yaw of all robots at the last K ticks, tick k in row k mod K; K is 0 where no scan is late."""
     cell_of: np.ndarray
     cell_start: np.ndarray
     cell_items: np.ndarray
@@ -240,6 +244,7 @@ def new_sim(
         queue_from=np.zeros((n, QUEUE), np.int64),
         queue_data=np.zeros((n, QUEUE, MAX_PACKET_BYTES), np.uint8),
         path=np.zeros((n, clock.substeps + 1, 2)),
+        past=_new_past(np.asarray(starts, float), noise.scan_age_s / clock.dt),
         cell_of=np.zeros(n, np.int64),
         cell_start=np.zeros(columns * rows + 1, np.int64),
         cell_items=np.zeros(n, np.int64),
@@ -258,6 +263,12 @@ def new_sim(
         clock=clock,
     )
     return sim, swarm
+
+
+def _new_past(starts: np.ndarray, ticks: float) -> np.ndarray:
+    """Return room for where robots were up to ``ticks`` ago; before the first one they stood."""
+    slots = math.ceil(ticks) + 2 if ticks > 0.0 else 0
+    return np.array(np.broadcast_to(starts, (slots, *starts.shape)))
 
 
 def new_records(ticks: int, robots: int, beams: int) -> Records:
