@@ -1,6 +1,12 @@
-"""Keys of sensors' errors: bounds, what is left alone where they are 0, and runs with each of them."""
+"""Keys of sensors' errors and of faults: bounds, what is left alone where they are 0, and runs with each of them."""
 
 from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 
@@ -8,7 +14,7 @@ from golden_runs import RECORDS, digest
 from helpers import circle, place_scenario, run_scenario
 from swarmscope.errors import ConfigError
 from swarmscope.scenarios.read import parse_scenario
-from swarmscope.scenarios.scenario import NoiseModel
+from swarmscope.scenarios.scenario import FaultsModel, NoiseModel
 from swarmscope.scenarios.to_kernels import make_rig_of
 
 T1 = {"task": {"name": "T1"}}
@@ -21,9 +27,15 @@ MODERATE = {
     "noise.stuck": 0.02,
     "noise.blind_deg": 2.0,
     "noise.scan_age_s": 0.05,
+    "faults.restarts_per_h": 60.0,
+    "faults.silences_per_h": 60.0,
+    "faults.clock_jumps_per_h": 60.0,
 }
-"""Each key at a value that robots have to live with."""
-ZERO = {"noise": dict.fromkeys(NoiseModel.model_fields, 0.0)}
+"""Each key at a value that robots have to live with; faults come once a minute to each robot."""
+ZERO = {
+    "noise": dict.fromkeys(NoiseModel.model_fields, 0.0),
+    "faults": {name: 0.0 if name.endswith("_per_h") else 3.0 for name in FaultsModel.model_fields},
+}
 TREES = [circle(x, y, 0.3) for x in (-2.0, 0.0, 2.0) for y in (-2.0, -0.7, 0.6, 1.9)]
 
 
@@ -66,6 +78,17 @@ def digest_of(trace):
         ("noise.blind_deg", float("nan")),
         ("noise.scan_age_s", 1.01),
         ("noise.scan_age_s", float("nan")),
+        ("faults.restarts_per_h", -1),
+        ("faults.restarts_per_h", 3601),
+        ("faults.restarts_per_h", float("nan")),
+        ("faults.restart_s", float("inf")),
+        ("faults.restart_s", float("nan")),
+        ("faults.silences_per_h", "often"),
+        ("faults.silence_s", -0.1),
+        ("faults.silence_s", float("nan")),
+        ("faults.clock_jumps_per_h", float("inf")),
+        ("faults.clock_jump_s", 86401),
+        ("faults.clock_jump_s", float("nan")),
     ],
 )
 def test_values_out_of_range_are_refused_at_their_place(key, value):
@@ -98,3 +121,48 @@ def test_the_guard_counts_on_the_oldest_scan():
 
     assert latency({}) == 0.0
     assert latency({"scan_age_s": 0.15}) == 0.15
+
+
+EVERYTHING = {
+    **MODERATE,
+    "noise.range_fraction": 0.02,
+    "noise.scan_age_s": 0.3,
+    "faults.restarts_per_h": 600.0,
+    "faults.restart_s": 0.4,
+    "faults.silences_per_h": 600.0,
+    "faults.clock_jumps_per_h": 600.0,
+    "lidar.beams": 90,
+    "guard.thinnest_m": 0.0,
+}
+
+
+def everything():
+    """A short run with all of it."""
+    starts = [(-2.0, 0.0, 0.0), (2.0, 0.3, 3.1), (0.0, -2.0, 1.5)]
+    values = place_scenario(starts, [(2.0, 0.0), (-2.0, 0.1), (0.0, 2.0)])
+    return run_scenario(values | {"limit_s": 5.0} | grouped(EVERYTHING))
+
+
+CODE = """
+import json
+import test_errors_and_faults as t
+trace = t.everything()
+print(json.dumps([t.digest_of(trace), trace.robots["boots"].tolist(), trace.robots["clock_s"].tolist()]))
+"""
+
+
+def test_all_of_it_is_the_same_without_the_compiler():
+    here = Path(__file__).parent
+    path = os.pathsep.join([str(here), str(here.parent), *sys.path])
+    done = subprocess.run(
+        [sys.executable, "-W", "ignore::RuntimeWarning", "-c", CODE],
+        env=os.environ | {"PYTHONPATH": path, "NUMBA_DISABLE_JIT": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr[-3000:]
+    trace = everything()
+    assert trace.robots["boots"].any() and trace.robots["clock_s"].any()
+    boots, clock_s = trace.robots["boots"].tolist(), trace.robots["clock_s"].tolist()
+    assert json.loads(done.stdout) == [digest_of(trace), boots, clock_s]

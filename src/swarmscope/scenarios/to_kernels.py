@@ -17,7 +17,7 @@ from swarmscope.scenarios.places import is_packaged
 from swarmscope.scenarios.scenario import NoiseModel, PlannerModel, Scenario
 from swarmscope.sim.lidar import make_beams
 from swarmscope.sim.loop import Setting
-from swarmscope.sim.state import Noise, Radio
+from swarmscope.sim.state import Faults, Noise, Radio
 from swarmscope.sim.world import compile_world
 from swarmscope.tasks import Setup, load_task
 from swarmscope.tasks._contract import all_options
@@ -119,6 +119,7 @@ def make_setting(scenario: Scenario, setup: Setup, threads: int = 1) -> Setting:
         params=_with_run_seed(planner.params(scenario.planner.params), scenario.seed),
         noise=_noise_of(scenario.noise),
         radio=Radio(**scenario.radio.model_dump(exclude={"exact_features"})),
+        faults=Faults(**scenario.faults.model_dump()),
         seed=scenario.seed,
         dt=dt,
         substeps=scenario.substeps,

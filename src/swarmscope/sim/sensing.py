@@ -33,7 +33,7 @@ def _sense_self(sim: Sim, tick: int, i: int) -> None:
     robot, percept = sim.robots[i], sim.percepts[i]
     heading = robot["yaw"] + compass_error(sim, tick, i)
     gx, gy = robot["goal_x"] - robot["x"], robot["goal_y"] - robot["y"]
-    percept["now_s"] = tick * sim.clock.dt
+    percept["now_s"] = tick * sim.clock.dt + robot["clock_s"]
     percept["compass"] = wrap_angle(heading)
     percept["goal_bearing"] = wrap_angle(math.atan2(gy, gx) - heading)
     percept["goal_distance"] = math.sqrt(gx * gx + gy * gy)

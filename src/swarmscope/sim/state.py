@@ -30,6 +30,11 @@ ROBOT = np.dtype(
         ("goal_x", np.float64),
         ("goal_y", np.float64),
         ("boots", np.int64),  # starts after the first one
+        ("down_until", np.int64),  # tick in which it runs again
+        ("silences", np.int64),  # times that its radio fell silent
+        ("mute_until", np.int64),  # tick in which its radio works again
+        ("clock_jumps", np.int64),
+        ("clock_s", np.float64),  # its own clock less the time of the run
         ("crashed", np.uint8),
         ("arrived", np.uint8),
         ("arrival_s", np.float64),
@@ -114,6 +119,28 @@ class Radio(NamedTuple):
     """A packet that would wait longer for the channel is dropped."""
 
 
+class Faults(NamedTuple):
+    """What fails in the middle of a run, at random times; a rate of 0 is never. Rates are for each robot."""
+
+    restarts_per_h: float = 0.0
+    restart_s: float = 5.0
+    """How long a robot that restarts is switched off."""
+    silences_per_h: float = 0.0
+    silence_s: float = 10.0
+    """How long a radio that falls silent neither sends nor hears."""
+    clock_jumps_per_h: float = 0.0
+    clock_jump_s: float = 5.0
+    """How far a clock jumps, to and fro."""
+
+
+class Conditions(NamedTuple):
+    """What a run puts its robots through."""
+
+    noise: Noise
+    radio: Radio
+    faults: Faults
+
+
 class Clock(NamedTuple):
     """Time of the simulation."""
 
@@ -188,6 +215,7 @@ class Sim(NamedTuple):
     range_min: float
     noise: Noise
     radio: Radio
+    faults: Faults
     clock: Clock
 
 
@@ -210,11 +238,11 @@ class Start(NamedTuple):
 
 
 def new_sim(
-    world: World, beams: Beams, rig: Rig, start: Start, air: tuple[Noise, Radio], clock: Clock
+    world: World, beams: Beams, rig: Rig, start: Start, conditions: Conditions, clock: Clock
 ) -> tuple[Sim, Swarm]:
-    """Return the simulation at its start, and the rows of its robots. ``air``: errors of the sensors, and the radio."""
+    """Return the simulation at its start, and the rows of its robots."""
     starts, goals, bounds = start
-    noise, radio = air
+    noise, radio, faults = conditions
     n = len(starts)
     robots = np.zeros(n, ROBOT)
     for k, name in enumerate(("x", "y", "yaw")):
@@ -260,6 +288,7 @@ def new_sim(
         range_min=float(rig.sensor.range_min),
         noise=Noise(*(float(v) for v in noise)),
         radio=radio,
+        faults=Faults(*(float(v) for v in faults)),
         clock=clock,
     )
     return sim, swarm
