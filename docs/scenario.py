@@ -59,6 +59,30 @@ Everything that a robot sends goes through its one radio of `radio.bitrate_bps`:
 radio.bitrate_bps=2000`. Code: `sim/radio.py`; packets byte by byte: [message.md](message.md).
 """
 
+WRONG = """## What goes wrong
+
+All of it is off by default, drawn from the seed, for each robot by itself, and the same for any number of threads. Each key has draws of its own: setting
+one leaves those of the others alone.
+
+- **Wheels** (`noise.odometry_*`). The robot measures its motion wrongly: speed and way scaled alike, the way with a random walk on top. It drives what it
+  commands. Of what a robot is told, odometry moves its tracks of neighbours and its memory of places; goal and heading come from elsewhere.
+- **Compass.** `compass_deg` is drawn for every scan, `compass_bias_deg` once for each robot; they add up. They turn the goal, features that are sent and
+  heard, and what neighbours see of the heading.
+- **LiDAR.** In this order: error of the range, lost returns (`dropout`), beams that say the longest range (`stuck`), the blind sector (`blind_deg`), broken
+  readings (`nan`). Broken readings can be told, and the robot bridges or blocks them; a stuck beam and a blind sector say *free*, and nobody can tell.
+  Mutual positioning is a sensor of its own: neighbours in the blind sector are still listed.
+- **Late scans** (`noise.scan_age_s` = T). Each scan is as the LiDAR would have seen it a random time below T before, from where the robot and all others were then; mutual
+  positioning, odometry and compass are of now. The robot does not know how late it is and takes it for a scan of now. The guard's `latency_s` is T ([safety.md](safety.md)). `robot.sensor_delay_s`
+  is another thing: by it planners keep wider margins; it makes no scan older.
+- **Restarts.** From one tick to the next the robot brakes, stands for `faults.restart_s`, sends and hears nothing, and loses what was on the way to it.
+  Then it runs like one that was just switched on: memory of planner, tracks and inbox empty, its clock at 0, its counter at 0, a new boot number ([message.md](message.md)). Its place stays, and who had arrived has arrived.
+  While it is off, `trajectory.npz` shows it in the state *yield*, standing still.
+- **Silence.** The radio alone fails: the robot drives on. Packets to it count as `packets_out_of_range`, those that were on the way as `packets_lost`.
+- **Clocks.** `now_s`, which a robot's planner reads, jumps by `faults.clock_jump_s`; time steps stay right. Forward, what is remembered for a time (features, neighbours out of sight) is
+  forgotten; back, it is remembered longer, and waits last longer, both by as much as the clock jumped. On a real robot `Robot` takes jumps out, at the price of one tick of braking.
+
+"""
+
 FORMULAS = (
     ("P_a (9)", "how sure the own features are that left is right", "Return P_a (9)", "`planner.params.prior`"),
     ("f_ai (12)", "weight of a neighbour by its distance", "(Nav-SCOPE 12", "`planner.params.w_i`"),
@@ -92,7 +116,7 @@ def page() -> str:
         request=8e3 * (REQUEST_BYTES + link.overhead_bytes) / link.bitrate_bps,
         features=8e3 * (28 + link.overhead_bytes) / link.bitrate_bps,
     )
-    parts = [HEAD, "## Keys\n", table(scenario_keys()), radio, formulas()]
+    parts = [HEAD, "## Keys\n", table(scenario_keys()), radio, WRONG + formulas()]
     parts += ["## Options of the tasks\n\nSet with `task.options.NAME`; what tasks are for: [tasks.md](tasks.md).\n"]
     parts += grouped(task_names(), task_keys)
     parts += ["## Parameters of the planners\n\nSet with `planner.params.NAME`; who: [planners.md](planners.md).\n"]

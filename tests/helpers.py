@@ -13,7 +13,7 @@ from swarmscope.onboard.rig import Guarding, Safety, Sharing, make_rig
 from swarmscope.onboard.rows import Rows
 from swarmscope.onboard.sensor import Sensor
 from swarmscope.sim.lidar import cast_static, make_beams
-from swarmscope.sim.state import Clock, Noise, Radio, Start, new_sim
+from swarmscope.sim.state import Clock, Conditions, Faults, Noise, Radio, Start, new_sim
 from swarmscope.sim.world import Circle, WorldSpec, compile_world
 
 DT = 0.2
@@ -93,15 +93,16 @@ def tick(rows):
     return rows.decision
 
 
-def place_sim(starts, goals=None, world=None, rig=None, noise=None, radio=None, **clock):
+def place_sim(starts, goals=None, world=None, rig=None, noise=None, radio=None, faults=None, **clock):
     """A simulation of robots at ``starts`` (x, y, yaw) and their rows; goals default to the starts."""
     rig = rig or rig_of()
     starts = np.asarray(starts, float)
     goals = starts[:, :2] if goals is None else np.asarray(goals, float)
     clock = Clock(**({"seed": 0, "dt": DT, "substeps": 20} | clock))
     world = world_of() if world is None else world
-    start, air = Start(starts, goals, BOUNDS), (noise or Noise(), radio or Radio())
-    return new_sim(world, beams_of(rig), rig, start, air, clock)
+    start = Start(starts, goals, BOUNDS)
+    conditions = Conditions(noise or Noise(), radio or Radio(), faults or Faults())
+    return new_sim(world, beams_of(rig), rig, start, conditions, clock)
 
 
 def place_scenario(starts, goals, obstacles=(), bounds=BOUNDS, **more):

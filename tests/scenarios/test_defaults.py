@@ -13,6 +13,7 @@ from swarmscope.onboard.body import Body
 from swarmscope.onboard.rig import Guarding, Safety, Sharing, make_rig
 from swarmscope.scenarios.places import make_setup
 from swarmscope.scenarios.scenario import (
+    FaultsModel,
     GuardModel,
     LidarModel,
     MapModel,
@@ -27,11 +28,11 @@ from swarmscope.scenarios.scenario import (
 )
 from swarmscope.scenarios.to_kernels import make_rig_of, make_setting
 from swarmscope.sim.loop import Setting
-from swarmscope.sim.state import Noise, Radio
+from swarmscope.sim.state import Faults, Noise, Radio
 
 MODELS = (
     Scenario, TaskModel, MapModel, WorldModel, PlannerModel, RobotModel, LidarModel, NoiseModel, RadioModel,
-    GuardModel, SafetyModel,
+    FaultsModel, GuardModel, SafetyModel,
 )  # fmt: skip
 SHORTEST = Scenario(task=TaskModel(name="swap"), robots=2)
 
@@ -40,6 +41,7 @@ def test_the_defaults_of_a_scenario_are_those_of_the_kernels():
     setting = make_setting(SHORTEST, make_setup(SHORTEST))
     assert setting.noise == Noise()
     assert setting.radio == Radio()
+    assert setting.faults == Faults()
     assert setting.rig.body == Body()
     plain = {field.name: field.default for field in dataclasses.fields(Setting)}
     for name in ("seed", "dt", "substeps", "limit_s"):
@@ -60,6 +62,7 @@ def test_the_rig_of_a_scenario_is_the_one_of_a_robot():
         (RadioModel, Radio()._asdict() | Sharing()._asdict()),
         (GuardModel, Guarding()._asdict()),
         (SafetyModel, Safety()._asdict()),
+        (FaultsModel, Faults()._asdict()),
     ],
 )
 def test_each_default_of_the_schema_is_the_one_of_the_tuple(model, kernels):
@@ -72,6 +75,7 @@ def test_noise_is_the_same_in_other_units():
     assert (noise.range_fraction, noise.dropout) == (Noise().range_fraction, Noise().dropout)
     assert math.radians(noise.bearing_deg) == Noise().bearing_rad
     assert math.radians(noise.compass_deg) == Noise().compass_rad
+    assert set(NoiseModel.model_fields) == {name.replace("_rad", "_deg") for name in Noise._fields}
 
 
 @pytest.mark.parametrize("model", MODELS)

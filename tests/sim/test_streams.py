@@ -19,10 +19,10 @@ from swarmscope.sim.streams import (
     SCAN_DROP,
     SCAN_NOISE,
     add_scan_noise,
-    drop_returns,
     key,
     mix,
     normal,
+    replace_readings,
     uniform,
 )
 
@@ -138,8 +138,8 @@ def test_neighbouring_beams_of_one_word_are_independent():
 
 def test_dropouts_come_with_the_given_share():
     ranges = np.full(40_000, 2.0, np.float32)
-    drop_returns(ranges, np.uint64(9), 0.1)
+    replace_readings(ranges, np.uint64(9), 0.1, np.inf)
     assert np.isinf(ranges).mean() == pytest.approx(0.1, abs=0.006)
     same = np.full(40_000, 2.0, np.float32)
-    drop_returns(same, np.uint64(9), 0.1)
+    replace_readings(same, np.uint64(9), 0.1, np.inf)
     assert (same == ranges).all()

@@ -21,7 +21,7 @@ UNITS = {
     "hz": "Hz",
 }  # fmt: skip
 """Units by the ends of names."""
-BRACKETS = re.compile(r"\s*\[((?:1/)?(?:m|s|rad|°|Hz|bit/s|bytes)[^\]]*)\]")
+BRACKETS = re.compile(r"\s*\[((?:1/)?(?:m|s|h|rad|°|Hz|bit/s|bytes)[^\]]*)\]")
 MUST = "must be given"
 KINDS = {"number": "number", "integer": "whole number", "boolean": "true or false", "string": "text", "array": "list"}
 LIMITS = {"exclusiveMinimum": ">", "minimum": "≥", "exclusiveMaximum": "<", "maximum": "≤"}
@@ -141,7 +141,7 @@ def _key(name: str, takes: str, default: Any, text: str) -> Key:
     """Return the key with its unit, from the brackets in its text or from the end of its name."""
     inside = BRACKETS.search(text)
     unit = inside[1] if inside else UNITS.get(name.rpartition(".")[2].rpartition("_")[2], "")
-    words = BRACKETS.sub("", text, count=1).strip()
+    words = " ".join(BRACKETS.sub("", text, count=1).split())
     return Key(name, takes, default, unit, words[:1].upper() + words[1:].rstrip("."))
 
 

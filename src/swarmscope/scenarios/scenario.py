@@ -1,7 +1,7 @@
 """The schema of a scenario: one file that describes one run completely, validated.
 
 A default that the kernels have, too, is taken from there: ``Body``, ``Guarding``, ``Safety``, ``Sharing``, ``Noise``,
-``Radio``, ``Setting``.
+``Radio``, ``Faults``, ``Setting``.
 The text after a field is its meaning, with the unit in brackets; docs/scenario.md and ``swarmscope config`` print it.
 """
 
@@ -16,17 +16,21 @@ from swarmscope.onboard.body import Body
 from swarmscope.onboard.lidar import Lidar
 from swarmscope.onboard.rig import Guarding, Safety, Sharing
 from swarmscope.sim.loop import Setting
-from swarmscope.sim.state import Noise, Radio
+from swarmscope.sim.state import Faults, Noise, Radio
 from swarmscope.sim.world import WorldSpec
 
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
 NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+Angle = Annotated[float, Field(ge=0.0, le=45.0)]
+Rate = Annotated[float, Field(ge=0.0, le=3600.0)]
+Duration = Annotated[float, Field(ge=0.0, le=86400.0)]
 
 BODY: Final = Body()
 LIDAR: Final = Lidar()
 NOISE: Final = Noise()
 RADIO: Final = Radio()
+FAULTS: Final = Faults()
 GUARDING: Final = Guarding()
 SAFETY: Final = Safety()
 SHARING: Final = Sharing()
@@ -72,16 +76,54 @@ class LidarModel(_Strict):
 
 
 class NoiseModel(_Strict):
-    """Sensor errors, one standard deviation each; 0 is none."""
+    """Sensor errors, standard deviations where nothing else is said; 0 is none."""
 
     range_fraction: Annotated[float, Field(ge=0.0, le=0.3)] = NOISE.range_fraction
     """Error of a LiDAR range, and of the distance to a neighbour, as a fraction of it."""
     dropout: Fraction = NOISE.dropout
     """Share of LiDAR returns that are lost."""
-    bearing_deg: Annotated[float, Field(ge=0.0, le=45.0)] = math.degrees(NOISE.bearing_rad)
+    bearing_deg: Angle = math.degrees(NOISE.bearing_rad)
     """Error of the bearing of a neighbour [°]."""
-    compass_deg: Annotated[float, Field(ge=0.0, le=45.0)] = math.degrees(NOISE.compass_rad)
+    compass_deg: Angle = math.degrees(NOISE.compass_rad)
     """Error of a robot's compass, drawn anew for every scan [°]."""
+    compass_bias_deg: Angle = math.degrees(NOISE.compass_bias_rad)
+    """Error of a robot's compass that stays the same for the whole run, beside the one drawn for every scan [°]."""
+    odometry_scale: Annotated[float, Field(ge=0.0, le=0.1)] = NOISE.odometry_scale
+    """Error of the size of a robot's wheels, the same for the whole run: of its speed and of all motion as it measures
+    them, as a fraction; it drives as it wants to."""
+    odometry_drift_m: Annotated[float, Field(ge=0.0, le=1.0)] = NOISE.odometry_drift_m
+    """Error of the place by odometry after 1 m, along and across, a random walk that grows with the root of the way
+    [m/√m]."""
+    odometry_turn_deg: Angle = math.degrees(NOISE.odometry_turn_rad)
+    """Error of the heading by odometry, in the same way; the package's planners read the compass instead [°/√m]."""
+    nan: Fraction = NOISE.nan
+    """Share of LiDAR readings that are broken (NaN), drawn anew for every scan."""
+    stuck: Fraction = NOISE.stuck
+    """Share of a robot's beams that say the longest range for the whole run, whatever is there."""
+    blind_deg: Annotated[float, Field(ge=0.0, le=360.0)] = math.degrees(NOISE.blind_rad)
+    """Width of the sector in which a robot's LiDAR finds nothing for the whole run; it lies anywhere in its field of
+    view [°]."""
+    scan_age_s: Annotated[float, Field(ge=0.0, le=1.0)] = NOISE.scan_age_s
+    """Age of the oldest scan that a robot decides on: each is by a random time below this older than the decision, with
+    all that moved and turned since; the guard counts on the oldest [s]."""
+
+
+class FaultsModel(_Strict):
+    """What fails in the middle of a run, at random times; a rate is for each robot, 0 is never."""
+
+    restarts_per_h: Rate = FAULTS.restarts_per_h
+    """How often a robot restarts: it brakes and stands, without radio, then runs again with an empty memory, a clock at
+    0 and a new boot number [1/h]."""
+    restart_s: Duration = FAULTS.restart_s
+    """How long it is switched off, braking included [s]."""
+    silences_per_h: Rate = FAULTS.silences_per_h
+    """How often a robot's radio falls silent: it neither sends nor hears [1/h]."""
+    silence_s: Duration = FAULTS.silence_s
+    """How long a radio is silent [s]."""
+    clock_jumps_per_h: Rate = FAULTS.clock_jumps_per_h
+    """How often a robot's own clock jumps, to and fro alike often [1/h]."""
+    clock_jump_s: Duration = FAULTS.clock_jump_s
+    """How far it jumps; by that much longer a robot may wait, for what its planner waits for, after a jump back [s]."""
 
 
 class RadioModel(_Strict):
@@ -194,9 +236,11 @@ class Scenario(_Strict):
     lidar: LidarModel = LidarModel()
     """The LiDAR."""
     noise: NoiseModel = NoiseModel()
-    """Sensor errors, one standard deviation each; 0 is none."""
+    """Sensor errors, standard deviations where nothing else is said; 0 is none."""
     radio: RadioModel = RadioModel()
     """The link between robots."""
+    faults: FaultsModel = FaultsModel()
+    """What fails in the middle of a run, at random times; a rate is for each robot, 0 is never."""
     guard: GuardModel = GuardModel()
     """Distances kept free around the body."""
     safety: SafetyModel = SafetyModel()

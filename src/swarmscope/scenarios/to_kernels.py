@@ -17,7 +17,7 @@ from swarmscope.scenarios.places import is_packaged
 from swarmscope.scenarios.scenario import NoiseModel, PlannerModel, Scenario
 from swarmscope.sim.lidar import make_beams
 from swarmscope.sim.loop import Setting
-from swarmscope.sim.state import Noise, Radio
+from swarmscope.sim.state import Faults, Noise, Radio
 from swarmscope.sim.world import compile_world
 from swarmscope.tasks import Setup, load_task
 from swarmscope.tasks._contract import all_options
@@ -64,7 +64,7 @@ def make_rig_of(scenario: Scenario) -> Rig:
     return make_rig(
         body,
         sensor,
-        Guarding(**guard.model_dump(exclude_none=True)),
+        Guarding(**guard.model_dump(exclude_none=True), latency_s=noise.scan_age_s),
         Safety(**safety.model_dump()),
         Sharing(exact_features=scenario.radio.exact_features),
     )
@@ -90,6 +90,14 @@ def _noise_of(noise: NoiseModel) -> Noise:
         dropout=noise.dropout,
         bearing_rad=math.radians(noise.bearing_deg),
         compass_rad=math.radians(noise.compass_deg),
+        compass_bias_rad=math.radians(noise.compass_bias_deg),
+        odometry_scale=noise.odometry_scale,
+        odometry_drift_m=noise.odometry_drift_m,
+        odometry_turn_rad=math.radians(noise.odometry_turn_deg),
+        nan=noise.nan,
+        stuck=noise.stuck,
+        blind_rad=math.radians(noise.blind_deg),
+        scan_age_s=noise.scan_age_s,
     )
 
 
@@ -111,6 +119,7 @@ def make_setting(scenario: Scenario, setup: Setup, threads: int = 1) -> Setting:
         params=_with_run_seed(planner.params(scenario.planner.params), scenario.seed),
         noise=_noise_of(scenario.noise),
         radio=Radio(**scenario.radio.model_dump(exclude={"exact_features"})),
+        faults=Faults(**scenario.faults.model_dump()),
         seed=scenario.seed,
         dt=dt,
         substeps=scenario.substeps,

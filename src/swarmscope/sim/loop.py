@@ -20,11 +20,24 @@ from swarmscope.onboard.rig import Rig
 from swarmscope.onboard.view import Swarm, arrays_of
 from swarmscope.sim.advice import Advice, tell_sides
 from swarmscope.sim.cells import index_robots
+from swarmscope.sim.faults import blanks, forget, strike
 from swarmscope.sim.lidar import Beams
 from swarmscope.sim.motion import judge, move
 from swarmscope.sim.radio import exchange
 from swarmscope.sim.sensing import sense
-from swarmscope.sim.state import CHOICES, Clock, Noise, Radio, Records, Sim, Start, new_records, new_sim
+from swarmscope.sim.state import (
+    CHOICES,
+    Clock,
+    Conditions,
+    Faults,
+    Noise,
+    Radio,
+    Records,
+    Sim,
+    Start,
+    new_records,
+    new_sim,
+)
 from swarmscope.sim.world import World
 
 CHUNK = 256
@@ -47,6 +60,7 @@ class Setting:
     params: Any
     noise: Noise = field(default_factory=Noise)
     radio: Radio = field(default_factory=Radio)
+    faults: Faults = field(default_factory=Faults)
     seed: int = 0
     dt: float = 0.2
     substeps: int = 20
@@ -111,7 +125,7 @@ def _log_choices(sim: Sim) -> None:
             continue
         choice = sim.choices[at]
         sim.choices_n[0] = at + 1
-        choice["tick"], choice["robot"] = int(percept["now_s"] / sim.clock.dt + 0.5), i
+        choice["tick"], choice["robot"] = int((percept["now_s"] - robot["clock_s"]) / sim.clock.dt + 0.5), i
         choice["x"], choice["y"] = robot["x"], robot["y"]
         choice["target"] = math.atan2(robot["goal_y"] - robot["y"], robot["goal_x"] - robot["x"])
         choice["p_self"], choice["p_left"] = decision["p_self"], decision["p_left"]
@@ -136,9 +150,10 @@ def world_phase(
 
 @jit
 def settle(sim: Sim, tick: int) -> bool:
-    """Judge the tick and sort the robots anew; return whether everybody has arrived or crashed."""
+    """Judge the tick, sort the robots anew, draw what fails next; return whether everybody has arrived or crashed."""
     judge(sim, tick)
     index_robots(sim)
+    strike(sim, tick + 1)
     done = 0
     for i in range(sim.robots.size):
         done += sim.robots[i]["arrived"] or sim.robots[i]["crashed"]
@@ -160,9 +175,11 @@ def run(setting: Setting, progress: Callable[[float, int], None] | None = None) 
     """
     clock = Clock(int(setting.seed), float(setting.dt), int(setting.substeps))
     start = Start(setting.starts, setting.goals, setting.bounds)
-    sim, swarm = new_sim(setting.world, setting.beams, setting.rig, start, (setting.noise, setting.radio), clock)
+    conditions = Conditions(setting.noise, setting.radio, setting.faults)
+    sim, swarm = new_sim(setting.world, setting.beams, setting.rig, start, conditions, clock)
     n = len(setting.starts)
     memory = setting.planner.new_memory(n)
+    forgotten = blanks(setting.planner, swarm, memory, setting.faults)
     step_all = partial(_step, setting, swarm, memory)
     beams = setting.rig.sensor.beams if setting.record_scans else 0
     ticks = math.ceil(setting.limit_s / setting.dt - 1e-9)
@@ -187,6 +204,8 @@ def run(setting: Setting, progress: Callable[[float, int], None] | None = None) 
             plan_us += _time_steps(step_all, n)
         else:
             pool.each(step_all)
+        for rows, blank in forgotten:
+            forget(sim, tick, rows, blank)
         if pool.size == 1:
             done = world_phase(sim, swarm.safe, chunks[-1], row, beams > 0, tick)
         else:

@@ -7,6 +7,7 @@ import math
 from swarmscope._jit import jit, jit_inner
 from swarmscope.onboard.percept import MAX_OUTBOX
 from swarmscope.onboard.sharing.message import MAX_PACKET_BYTES, is_request
+from swarmscope.sim.faults import is_off_air
 from swarmscope.sim.state import LINKS, QUEUE, Sim
 from swarmscope.sim.streams import RADIO_LOSS, key, mix, uniform
 
@@ -19,6 +20,8 @@ def exchange(sim: Sim, tick: int) -> None:
         if sim.robots[i]["crashed"]:
             continue
         sim.robots[i]["fusions"] += decision["fused"]
+        if is_off_air(sim.robots[i], tick):
+            continue
         for k in range(min(MAX_OUTBOX, decision["n_out"])):
             _send(sim, tick, i, k)
 
@@ -46,7 +49,7 @@ def _send(sim: Sim, tick: int, i: int, k: int) -> None:
         sender["feature_bytes"] += length
     sender["radio_free_s"] = begin + airtime
     dx, dy = receiver["x"] - sender["x"], receiver["y"] - sender["y"]
-    if math.sqrt(dx * dx + dy * dy) > radio.range_m or receiver["crashed"]:
+    if math.sqrt(dx * dx + dy * dy) > radio.range_m or receiver["crashed"] or is_off_air(receiver, tick):
         sender["unreachable"] += 1
         return
     receiver["radio_free_s"] = begin + airtime

@@ -8,20 +8,11 @@ from swarmscope._jit import jit, jit_inner
 from swarmscope.geometry import wrap_angle
 from swarmscope.onboard.percept import MAX_INBOX, MAX_NEIGHBOURS, Row
 from swarmscope.sim.cells import column_of, row_of
+from swarmscope.sim.errors import compass_error, measure_motion, spoil_scan
+from swarmscope.sim.lateness import cast_late, note_pose
 from swarmscope.sim.lidar import cast_disc, cast_static
 from swarmscope.sim.state import Sim
-from swarmscope.sim.streams import (
-    BEARING_NOISE,
-    COMPASS_NOISE,
-    RANGE_NOISE,
-    SCAN_DROP,
-    SCAN_NOISE,
-    add_scan_noise,
-    drop_returns,
-    key,
-    mix,
-    normal,
-)
+from swarmscope.sim.streams import BEARING_NOISE, RANGE_NOISE, key, mix, normal
 
 SIGHT_SLACK = 0.05
 """A neighbour is in sight when the beam towards its centre ends at most this short of its surface [m]."""
@@ -37,30 +28,16 @@ def sense(sim: Sim, tick: int, first: int, last: int) -> None:
 
 
 @jit_inner
-def _compass_error(sim: Sim, tick: int, i: int) -> float:
-    """Return the error of robot i's compass at this tick [rad]."""
-    if sim.noise.compass_rad <= 0.0:
-        return 0.0
-    return sim.noise.compass_rad * normal(key(sim.clock.seed, i, tick, COMPASS_NOISE))
-
-
-@jit_inner
 def _sense_self(sim: Sim, tick: int, i: int) -> None:
     """Fill clock, compass, goal and odometry of robot i."""
     robot, percept = sim.robots[i], sim.percepts[i]
-    heading = robot["yaw"] + _compass_error(sim, tick, i)
+    heading = robot["yaw"] + compass_error(sim, tick, i)
     gx, gy = robot["goal_x"] - robot["x"], robot["goal_y"] - robot["y"]
-    percept["now_s"] = tick * sim.clock.dt
-    percept["speed"] = robot["v"]
+    percept["now_s"] = tick * sim.clock.dt + robot["clock_s"]
     percept["compass"] = wrap_angle(heading)
     percept["goal_bearing"] = wrap_angle(math.atan2(gy, gx) - heading)
     percept["goal_distance"] = math.sqrt(gx * gx + gy * gy)
-    dx, dy = robot["x"] - robot["last_x"], robot["y"] - robot["last_y"]
-    c, s = math.cos(robot["last_yaw"]), math.sin(robot["last_yaw"])
-    percept["odom_x"] = c * dx + s * dy
-    percept["odom_y"] = c * dy - s * dx
-    percept["odom_yaw"] = wrap_angle(robot["yaw"] - robot["last_yaw"])
-    robot["last_x"], robot["last_y"], robot["last_yaw"] = robot["x"], robot["y"], robot["yaw"]
+    measure_motion(sim, tick, i)
 
 
 @jit_inner
@@ -85,15 +62,10 @@ def _scan_and_neighbours(sim: Sim, tick: int, i: int) -> None:
             cast_disc(bx, by, sim.radius, sim.beams, ranges)
             found = _insert(percept, found, j, bx, by)
     _keep_visible(sim, tick, i, found)
-    noise = sim.noise
-    if noise.range_fraction > 0.0:
-        add_scan_noise(ranges, key(sim.clock.seed, i, tick, SCAN_NOISE), noise.range_fraction, sim.beams.range_max)
-    if noise.dropout > 0.0:
-        drop_returns(ranges, key(sim.clock.seed, i, tick, SCAN_DROP), noise.dropout)
-    if sim.range_min > 0.0:
-        for n in range(ranges.size):
-            if ranges[n] < sim.range_min:
-                ranges[n] = math.nan
+    if sim.noise.scan_age_s > 0.0:
+        note_pose(sim, tick, i)
+        cast_late(sim, tick, i)
+    spoil_scan(sim, tick, i)
 
 
 @jit_inner
@@ -118,7 +90,7 @@ def _keep_visible(sim: Sim, tick: int, i: int, found: int) -> None:
     """Keep the neighbours in line of sight by robot i's own (noise-free) scan; add the sensor's errors."""
     percept, ranges, beams, noise = sim.percepts[i], sim.ranges[i], sim.beams, sim.noise
     ids, xs, ys = percept["neighbour_id"], percept["neighbour_x"], percept["neighbour_y"]
-    error = _compass_error(sim, tick, i)
+    error = compass_error(sim, tick, i)
     kept = 0
     for k in range(found):
         j, x, y = ids[k], xs[k], ys[k]
@@ -136,7 +108,7 @@ def _keep_visible(sim: Sim, tick: int, i: int, found: int) -> None:
             bearing += noise.bearing_rad * normal(bits)
             x, y = distance * math.cos(bearing), distance * math.sin(bearing)
         ids[kept], xs[kept], ys[kept] = j, x, y
-        heading = sim.robots[j]["yaw"] + _compass_error(sim, tick, j)
+        heading = sim.robots[j]["yaw"] + compass_error(sim, tick, j)
         percept["neighbour_yaw"][kept] = wrap_angle(heading - sim.robots[i]["yaw"] - error)
         kept += 1
     percept["n_neighbours"] = kept

@@ -30,6 +30,11 @@ ROBOT = np.dtype(
         ("goal_x", np.float64),
         ("goal_y", np.float64),
         ("boots", np.int64),  # starts after the first one
+        ("down_until", np.int64),  # tick in which it runs again
+        ("silences", np.int64),  # times that its radio fell silent
+        ("mute_until", np.int64),  # tick in which its radio works again
+        ("clock_jumps", np.int64),
+        ("clock_s", np.float64),  # its own clock less the time of the run
         ("crashed", np.uint8),
         ("arrived", np.uint8),
         ("arrival_s", np.float64),
@@ -74,7 +79,7 @@ CHOICE = np.dtype(
 
 
 class Noise(NamedTuple):
-    """Sensor errors, one standard deviation each; 0 is none."""
+    """Sensor errors, standard deviations where nothing else is said; 0 is none."""
 
     range_fraction: float = 0.0
     """Of a LiDAR range and of the distance to a neighbour, as a fraction of it."""
@@ -83,6 +88,22 @@ class Noise(NamedTuple):
     bearing_rad: float = 0.0
     """Of the bearing of a neighbour."""
     compass_rad: float = 0.0
+    compass_bias_rad: float = 0.0
+    """The same for a whole run, as all that follows but for the drift."""
+    odometry_scale: float = 0.0
+    """Of the wheels' size: of the speed and of all motion that a robot measures, as a fraction of it."""
+    odometry_drift_m: float = 0.0
+    """Of the place by odometry after 1 m, in both directions; it grows with the root of the way [m/sqrt(m)]."""
+    odometry_turn_rad: float = 0.0
+    """Of the heading by odometry, in the same way [rad/sqrt(m)]."""
+    nan: float = 0.0
+    """Share of LiDAR readings that are broken (NaN), drawn anew for every scan."""
+    stuck: float = 0.0
+    """Share of beams that say the longest range, whatever is there."""
+    blind_rad: float = 0.0
+    """Width of a sector without returns."""
+    scan_age_s: float = 0.0
+    """Age of the oldest scan when it is decided on; each has one of its own below this."""
 
 
 class Radio(NamedTuple):
@@ -96,6 +117,28 @@ class Radio(NamedTuple):
     """Preamble, header and checksum of the link layer per packet (IEEE 802.15.4: 6 + 15 + 2)."""
     max_wait_s: float = 0.5
     """A packet that would wait longer for the channel is dropped."""
+
+
+class Faults(NamedTuple):
+    """What fails in the middle of a run, at random times; a rate of 0 is never. Rates are for each robot."""
+
+    restarts_per_h: float = 0.0
+    restart_s: float = 5.0
+    """How long a robot that restarts is switched off."""
+    silences_per_h: float = 0.0
+    silence_s: float = 10.0
+    """How long a radio that falls silent neither sends nor hears."""
+    clock_jumps_per_h: float = 0.0
+    clock_jump_s: float = 5.0
+    """How far a clock jumps, to and fro."""
+
+
+class Conditions(NamedTuple):
+    """What a run puts its robots through."""
+
+    noise: Noise
+    radio: Radio
+    faults: Faults
 
 
 class Clock(NamedTuple):
@@ -155,6 +198,8 @@ class Sim(NamedTuple):
     queue_from: np.ndarray
     queue_data: np.ndarray
     path: np.ndarray
+    past: np.ndarray
+    """(K, N, 3): x, y, yaw of all robots at the last K ticks, tick k in row k mod K; K is 0 where no scan is late."""
     cell_of: np.ndarray
     cell_start: np.ndarray
     cell_items: np.ndarray
@@ -170,6 +215,7 @@ class Sim(NamedTuple):
     range_min: float
     noise: Noise
     radio: Radio
+    faults: Faults
     clock: Clock
 
 
@@ -192,11 +238,11 @@ class Start(NamedTuple):
 
 
 def new_sim(
-    world: World, beams: Beams, rig: Rig, start: Start, air: tuple[Noise, Radio], clock: Clock
+    world: World, beams: Beams, rig: Rig, start: Start, conditions: Conditions, clock: Clock
 ) -> tuple[Sim, Swarm]:
-    """Return the simulation at its start, and the rows of its robots. ``air``: errors of the sensors, and the radio."""
+    """Return the simulation at its start, and the rows of its robots."""
     starts, goals, bounds = start
-    noise, radio = air
+    noise, radio, faults = conditions
     n = len(starts)
     robots = np.zeros(n, ROBOT)
     for k, name in enumerate(("x", "y", "yaw")):
@@ -226,6 +272,7 @@ def new_sim(
         queue_from=np.zeros((n, QUEUE), np.int64),
         queue_data=np.zeros((n, QUEUE, MAX_PACKET_BYTES), np.uint8),
         path=np.zeros((n, clock.substeps + 1, 2)),
+        past=_new_past(np.asarray(starts, float), noise.scan_age_s / clock.dt),
         cell_of=np.zeros(n, np.int64),
         cell_start=np.zeros(columns * rows + 1, np.int64),
         cell_items=np.zeros(n, np.int64),
@@ -241,9 +288,16 @@ def new_sim(
         range_min=float(rig.sensor.range_min),
         noise=Noise(*(float(v) for v in noise)),
         radio=radio,
+        faults=Faults(*(float(v) for v in faults)),
         clock=clock,
     )
     return sim, swarm
+
+
+def _new_past(starts: np.ndarray, ticks: float) -> np.ndarray:
+    """Return room for where robots were up to ``ticks`` ago; before the first one they stood."""
+    slots = math.ceil(ticks) + 2 if ticks > 0.0 else 0
+    return np.array(np.broadcast_to(starts, (slots, *starts.shape)))
 
 
 def new_records(ticks: int, robots: int, beams: int) -> Records:

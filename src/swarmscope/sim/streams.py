@@ -10,6 +10,9 @@ import numpy as np
 from swarmscope._jit import jit, jit_inline
 
 SCAN_NOISE, SCAN_DROP, RANGE_NOISE, BEARING_NOISE, COMPASS_NOISE, RADIO_LOSS, BOOT = range(1, 8)
+ODOMETRY_SCALE, ODOMETRY_X, ODOMETRY_Y, ODOMETRY_YAW, COMPASS_BIAS = range(8, 13)
+NAN_READINGS, STUCK_BEAMS, BLIND_SECTOR, SCAN_AGE = range(13, 17)
+RESTART, SILENCE, CLOCK_JUMP = range(17, 20)
 """Purposes."""
 
 Bits: TypeAlias = Any
@@ -78,10 +81,10 @@ def add_scan_noise(ranges: np.ndarray, k: Bits, sigma: float, range_max: float) 
 
 
 @jit
-def drop_returns(ranges: np.ndarray, k: Bits, probability: float) -> None:
-    """Lose each return with ``probability``: no return (+inf) instead."""
+def replace_readings(ranges: np.ndarray, k: Bits, share: float, value: float) -> None:
+    """Put ``value`` in the place of each reading with the probability ``share``."""
     state = k
     for n in range(ranges.size):
         state = state + _A
-        if uniform(mix(state)) < probability:
-            ranges[n] = np.inf
+        if uniform(mix(state)) < share:
+            ranges[n] = value
