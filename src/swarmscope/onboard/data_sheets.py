@@ -13,6 +13,7 @@ from swarmscope.onboard.lidar import Lidar, finite, sensor_of
 from swarmscope.onboard.planners import Planner, load_planner
 from swarmscope.onboard.rig import GUARDING, SAFETY, SHARING, Guarding, Rig, Safety, Sharing, make_rig
 from swarmscope.onboard.scans import Scans
+from swarmscope.onboard.sensor import all_round
 
 DEFAULTS: dict[str, Any] = {**GUARDING._asdict(), **SAFETY._asdict(), **SHARING._asdict()}
 """Options of a robot, by the keys of a scenario."""
@@ -93,7 +94,7 @@ def rig_of(body: Body, lidar: Lidar, scans: Scans, options: Mapping[str, Any]) -
     if lidar.range_m < reach:
         raise ConfigError("lidar.range_m", f"{lidar.range_m:g} m is less than this body needs to stop, {reach:.2f} m")
     parts = (_part(kind, options) for kind in (Guarding, Safety, Sharing))
-    return make_rig(body, sensor_of(lidar, scans.grid), *parts)
+    return make_rig(body, all_round(sensor_of(lidar, scans.grid)), *parts)
 
 
 def _part(kind: Any, options: Mapping[str, Any]) -> Any:

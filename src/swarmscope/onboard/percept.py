@@ -127,6 +127,14 @@ SHARED = np.dtype(
         ("dropped_stale", np.int64),  # old, replayed or unasked-for packets
         ("started", np.uint8),
         ("compass", np.float64),  # of the last tick
+        ("view_first", np.int64),  # beams of a limited field of view between which something is known
+        ("view_last", np.int64),
+        ("unseen_left", np.uint8),  # on which side of the way something has not been seen
+        ("look_rad", np.float64),  # what is left of a look round [rad]
+        ("frames_n", np.int64),  # scans that it has kept
+        ("frame_at", np.int64),  # the newest of them
+        ("losses", np.float64),  # share of returns that get lost from scan to scan
+        ("blind_s", np.float64),  # since when nothing is seen where something was [s]
         ("goal_x", np.float64),  # body frame of the last tick [m]
         ("goal_y", np.float64),
         # own displacement since the start, by odometry and compass (drifts; never a global position)

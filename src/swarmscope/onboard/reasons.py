@@ -21,8 +21,13 @@ REASON_NAMES = (
     "waits for a neighbour to pass",
     "stands still: no direction is free",
     "arrived at the goal",
-    "guard: slowed down to keep its braking distance",
     "collided",
+    "guard: stands, something is in the way",
+    "guard: stands, another robot is in the way",
+    "guard: stands, somebody may come round a corner",
+    "guard: stands, looks at what it has not seen beside its way",
+    "guard: stands, the LiDAR loses too much of what is there",
+    "guard: stands, a number is missing: time, speed, compass or command",
 )
 (
     R_FREE,
@@ -37,7 +42,12 @@ REASON_NAMES = (
     R_YIELD,
     R_BLOCKED_WAIT,
     R_ARRIVED,
-    R_GUARD,
     R_COLLIDED,
-) = range(14)
+    R_HELD_THING,
+    R_HELD_ROBOT,
+    R_HELD_CORNER,
+    R_HELD_UNSEEN,
+    R_HELD_BLIND,
+    R_HELD_NO_NUMBER,
+) = range(19)
 FIRST_OWN = len(REASON_NAMES)

@@ -29,6 +29,10 @@ class Guarding(NamedTuple):
     """Added to the body's radius: what is swept."""
     persistence_s: float = 2.0
     """How long an unseen neighbour is remembered."""
+    lost_s: float = 1.0
+    """How long a return is kept that is lost while no beam has passed its place."""
+    blind_s: float = 0.5
+    """A robot brakes when its LiDAR has said nothing for so long, where something was."""
     latency_s: float = 0.0
     """Age of a scan when its command takes effect."""
     thinnest_m: float = 0.02

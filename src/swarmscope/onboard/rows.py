@@ -29,8 +29,9 @@ class Rows:
 
     @property
     def scan(self) -> np.ndarray:
-        """What is seen (M,) float32 [m]."""
-        row: np.ndarray = self.swarm.scans[0]
+        """What the LiDAR fills, (F,) float32 [m]: everything, or its field of view."""
+        sensor = self.rig.sensor
+        row: np.ndarray = self.swarm.scans[0, sensor.first : sensor.first + (sensor.field or sensor.beams)]
         return row
 
     @property

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 
@@ -19,3 +20,25 @@ class Sensor(NamedTuple):
     """Standard deviation of a LiDAR range as a fraction of it."""
     position_sigma: float
     """Standard deviation of a neighbour's measured position as a fraction of its distance."""
+    first: int = 0
+    """The first beam that the LiDAR itself fills, ..."""
+    field: int = 0
+    """... and how many it fills; the rest is remembered (``perception/frames.py``). 0: all, nothing is."""
+
+
+def all_round(sensor: Sensor) -> Sensor:
+    """Return a sensor of the full circle, with ``sensor``, of a limited field of view, as a part of it.
+
+    The circle ends opposite to the field's middle; there two beams may lie up to two increments apart.
+    """
+    if sensor.wraps:
+        return sensor
+    beams = max(sensor.beams, int(2.0 * math.pi / sensor.increment + 1e-6))
+    first = (beams - sensor.beams) // 2
+    return sensor._replace(
+        beams=beams,
+        angle_min=sensor.angle_min - first * sensor.increment,
+        wraps=True,
+        first=first,
+        field=sensor.beams,
+    )

@@ -10,6 +10,8 @@ from swarmscope.onboard.control.guard import guard
 from swarmscope.onboard.perception.bearings import steady
 from swarmscope.onboard.perception.features import align_features, extrema
 from swarmscope.onboard.perception.filters import filter_padded, prepare_scan
+from swarmscope.onboard.perception.frames import keep_frame, look_back
+from swarmscope.onboard.perception.lost import keep_lost
 from swarmscope.onboard.perception.mend import mend
 from swarmscope.onboard.perception.safety import safe_directions
 from swarmscope.onboard.rig import AHEAD, PRINTED
@@ -30,7 +32,12 @@ def perceive(see: View, still_s: float) -> None:
     dx, dy = update_odometry(see.percept, see.shared)
     read_inbox(see)
     update_tracks(see.percept, see.shared, see.rig, dx, dy)
+    if see.rig.sensor.field > 0:
+        look_back(see)
     mend(see.scan, see.rig)
+    if see.rig.sensor.field > 0:
+        keep_frame(see)
+    keep_lost(see)
     mask_moving_neighbours(see, still_s)
     safe_directions(see.masked, see.rig.sensor, see.reach[AHEAD], see.edges, see.safe)
 
@@ -56,6 +63,10 @@ def own_features(see: View) -> int:
     """
     sensor = see.rig.sensor
     safe_directions(see.masked, sensor, see.reach[PRINTED], see.edges, see.narrow)
+    if sensor.field > 0:
+        for n in range(sensor.beams):  # what is only remembered is not told
+            if not see.shared["view_first"] <= n <= see.shared["view_last"]:
+                see.narrow[n] = 0
     prepare_scan(see.masked, sensor.range_min, sensor.range_max, sensor.wraps, see.rig.half, see.padded)
     filter_padded(see.padded, see.rig.taps, sensor.range_max, see.filtered)
     count = extrema(see.filtered, see.narrow, sensor, see.other.angles, see.other.distances)

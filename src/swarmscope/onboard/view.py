@@ -6,6 +6,7 @@ know of them has to come by radio. A loop over robots holds a ``Swarm`` and take
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +17,9 @@ from swarmscope.onboard.percept import DECISION, PERCEPT, Row, new_shared
 from swarmscope.onboard.rig import Rig, level_of, margins_at
 from swarmscope.onboard.sharing.message import HEADER_FIELDS, MAX_FEATURES
 
+FEWEST_FRAMES, FRAMES_PER_TURN = 6, 2.7
+"""Scans that are kept where the view is limited: so many times as many as fill the circle."""
+
 
 class Table(NamedTuple):
     """Features of a scan: ``angles (K,)`` [rad] and ``distances (K,)`` [m] of its extrema, ascending in the angle."""
@@ -24,11 +28,25 @@ class Table(NamedTuple):
     distances: np.ndarray
 
 
+class Frames(NamedTuple):
+    """Scans of a limited field of view, kept on the way (``perception/frames.py``); none where the circle is full."""
+
+    scans: np.ndarray
+    """(K, F) float32, F beams of the field [m]: negative up to where nothing but a neighbour was, NaN: nobody knows."""
+    poses: np.ndarray
+    """(K, 3): where each was taken, x, y [m], yaw [rad], body frame of now."""
+
+
 class View(NamedTuple):
     """What one robot has in one tick. M beams."""
 
     scan: np.ndarray
     """(M,) float32: ranges as measured [m]; inf = no return, NaN = broken."""
+    kept: np.ndarray
+    """(M,) float32: the scan of the last tick with what it had lost; 0 = there was none."""
+    unseen: np.ndarray
+    """(M,) uint8: for how many ticks what is kept there has not been seen."""
+    frames: Frames
     masked: np.ndarray
     """(M,) float32: the scan without moving neighbours."""
     safe: np.ndarray
@@ -64,6 +82,9 @@ class Swarm(NamedTuple):
     """The same for N robots, a row each."""
 
     scans: np.ndarray
+    kept: np.ndarray
+    unseen: np.ndarray
+    frames: Frames
     masked: np.ndarray
     safe: np.ndarray
     own: Table
@@ -86,11 +107,16 @@ def _table(robots: int) -> Table:
 def new_swarm(robots: int, rig: Rig) -> Swarm:
     """Return the rows of ``robots`` robots that have seen nothing yet, their addresses 0, 1, ..."""
     beams = rig.sensor.beams
+    field = rig.sensor.field
+    frames = max(FEWEST_FRAMES, math.ceil(FRAMES_PER_TURN * beams / field)) if field else 0
     percepts, decisions = np.zeros(robots, PERCEPT), np.zeros(robots, DECISION)
     percepts["id"] = np.arange(robots)
     decisions["p_self"] = decisions["p_left"] = np.nan
     return Swarm(
         scans=np.full((robots, beams), np.inf, np.float32),
+        kept=np.zeros((robots, beams), np.float32),
+        unseen=np.zeros((robots, beams), np.uint8),
+        frames=Frames(np.zeros((robots, frames, field), np.float32), np.zeros((robots, frames, 3))),
         masked=np.zeros((robots, beams), np.float32),
         safe=np.zeros((robots, beams), np.uint8),
         own=_table(robots),
@@ -113,6 +139,9 @@ def view_of(swarm: Swarm, i: int) -> View:
     level = level_of(swarm.percepts[i]["speed"], swarm.rig)
     return View(
         swarm.scans[i],
+        swarm.kept[i],
+        swarm.unseen[i],
+        Frames(swarm.frames.scans[i], swarm.frames.poses[i]),
         swarm.masked[i],
         swarm.safe[i],
         Table(swarm.own.angles[i], swarm.own.distances[i]),
@@ -141,7 +170,7 @@ def arrays_of(swarm: Swarm) -> list[np.ndarray]:
     """Return every array of a swarm's robots, a row each."""
     found: list[np.ndarray] = []
     for part in swarm:
-        if isinstance(part, Table):
+        if isinstance(part, Table | Frames):
             found += part
         elif isinstance(part, np.ndarray):
             found.append(part)

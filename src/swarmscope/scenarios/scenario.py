@@ -150,6 +150,10 @@ class GuardModel(_Strict):
     """Added to the radius where ways are planned: directions that the widened body can take are safe [m]."""
     persistence_s: NotNegative = GUARDING.persistence_s
     """How long a neighbour that is out of sight is remembered [s]."""
+    lost_s: NotNegative = GUARDING.lost_s
+    """How long a return is kept that is lost while no beam has passed its place [s]."""
+    blind_s: NotNegative = GUARDING.blind_s
+    """A robot brakes when its LiDAR has said nothing for so long, where something was [s]."""
     thinnest_m: NotNegative = GUARDING.thinnest_m
     """Width of the narrowest thing that must not be missed between two beams: robots drive no faster than they can stop
     short of it; 0 asks for nothing [m]."""

@@ -12,7 +12,7 @@ from swarmscope.onboard.body import Body
 from swarmscope.onboard.data_sheets import check_horizon
 from swarmscope.onboard.planners import Planner, load_planner
 from swarmscope.onboard.rig import Guarding, Rig, Safety, Sharing, make_rig
-from swarmscope.onboard.sensor import Sensor
+from swarmscope.onboard.sensor import Sensor, all_round
 from swarmscope.scenarios.places import is_packaged
 from swarmscope.scenarios.scenario import NoiseModel, PlannerModel, Scenario
 from swarmscope.sim.lidar import make_beams
@@ -63,7 +63,7 @@ def make_rig_of(scenario: Scenario) -> Rig:
     guard, safety = scenario.guard, scenario.safety
     return make_rig(
         body,
-        sensor,
+        all_round(sensor),
         Guarding(**guard.model_dump(exclude_none=True), latency_s=noise.scan_age_s),
         Safety(**safety.model_dump()),
         Sharing(exact_features=scenario.radio.exact_features),

@@ -111,7 +111,7 @@ def record_tick(sim: Sim, safe: np.ndarray, records: Records, row: int, with_sca
                 s = sim.ranges[i, n]
                 level = 255 if not s <= sim.beams.range_max else int(254.0 * s / sim.beams.range_max + 0.5)
                 records.scan[row, i, n] = level
-                if safe[i, n]:
+                if safe[i, sim.first_beam + n]:
                     records.safe[row, i, n >> 3] |= np.uint8(128 >> (n & 7))
 
 
@@ -181,7 +181,7 @@ def run(setting: Setting, progress: Callable[[float, int], None] | None = None) 
     memory = setting.planner.new_memory(n)
     forgotten = blanks(setting.planner, swarm, memory, setting.faults)
     step_all = partial(_step, setting, swarm, memory)
-    beams = setting.rig.sensor.beams if setting.record_scans else 0
+    beams = sim.ranges.shape[1] if setting.record_scans else 0
     ticks = math.ceil(setting.limit_s / setting.dt - 1e-9)
     chunks: list[Records] = []
     pool = _Pool(n, setting.threads)

@@ -10,7 +10,7 @@ from swarmscope.onboard.percept import MAX_INBOX, MAX_NEIGHBOURS, Row
 from swarmscope.sim.cells import column_of, row_of
 from swarmscope.sim.errors import compass_error, measure_motion, spoil_scan
 from swarmscope.sim.lateness import cast_late, note_pose
-from swarmscope.sim.lidar import cast_disc, cast_static
+from swarmscope.sim.lidar import Beams, cast_disc, cast_static
 from swarmscope.sim.state import Sim
 from swarmscope.sim.streams import BEARING_NOISE, RANGE_NOISE, key, mix, normal
 
@@ -66,6 +66,9 @@ def _scan_and_neighbours(sim: Sim, tick: int, i: int) -> None:
         note_pose(sim, tick, i)
         cast_late(sim, tick, i)
     spoil_scan(sim, tick, i)
+    if ranges.size < sim.scans.shape[1]:
+        for n in range(ranges.size):
+            sim.scans[i, sim.first_beam + n] = ranges[n]
 
 
 @jit_inner
@@ -99,7 +102,10 @@ def _keep_visible(sim: Sim, tick: int, i: int, found: int) -> None:
         n = int(math.floor((bearing - beams.angle_min) / beams.increment + 0.5))
         if beams.wraps:
             n = n % ranges.size
-        if n < 0 or n >= ranges.size or ranges[n] < distance - sim.radius - SIGHT_SLACK:
+        if 0 <= n < ranges.size:
+            if ranges[n] < distance - sim.radius - SIGHT_SLACK:
+                continue
+        elif not _in_sight(sim, i, j, found):
             continue
         if noise.range_fraction > 0.0 or noise.bearing_rad > 0.0:
             bits = mix(key(sim.clock.seed, i, tick, RANGE_NOISE) + key(0, j, 0, RANGE_NOISE))
@@ -112,6 +118,28 @@ def _keep_visible(sim: Sim, tick: int, i: int, found: int) -> None:
         percept["neighbour_yaw"][kept] = wrap_angle(heading - sim.robots[i]["yaw"] - error)
         kept += 1
     percept["n_neighbours"] = kept
+
+
+@jit_inner
+def _in_sight(sim: Sim, i: int, j: int, found: int) -> bool:
+    """Tell whether nothing stands between robots i and j, where the LiDAR does not look.
+
+    Mutual positioning is a sensor of its own: it works all round. Who could be in between is among the first ``found``
+    neighbours of the list, kept ones first.
+    """
+    robot, other, ray = sim.robots[i], sim.robots[j], sim.sight[i]
+    dx, dy = other["x"] - robot["x"], other["y"] - robot["y"]
+    distance = math.sqrt(dx * dx + dy * dy)
+    towards = math.atan2(dy, dx)
+    beams = Beams(sim.straight_cos, sim.straight_sin, 0.0, 2.0 * math.pi, True, max(distance, 1e-3))
+    cast_static(sim.world, robot["x"], robot["y"], towards, beams, ray)
+    c, s = dx / max(distance, 1e-9), dy / max(distance, 1e-9)
+    for k in range(found):
+        third = sim.percepts[i]["neighbour_id"][k]
+        if third != j:
+            ex, ey = sim.robots[third]["x"] - robot["x"], sim.robots[third]["y"] - robot["y"]
+            cast_disc(c * ex + s * ey, c * ey - s * ex, sim.radius, beams, ray)
+    return bool(ray[0] >= distance - sim.radius - SIGHT_SLACK)
 
 
 @jit_inner

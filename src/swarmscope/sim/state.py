@@ -191,6 +191,15 @@ class Sim(NamedTuple):
     percepts: np.ndarray
     decisions: np.ndarray
     ranges: np.ndarray
+    """(N, F) float32: what the LiDARs measure [m]; the same memory as ``scans`` where they see the full circle."""
+    scans: np.ndarray
+    """(N, M) float32: what robots are given, the measured beams from ``first_beam`` on."""
+    first_beam: int
+    sight: np.ndarray
+    """(N, 1) float32: scratch of one ray."""
+    straight_cos: np.ndarray
+    """(1,): the ray straight ahead."""
+    straight_sin: np.ndarray
     told: np.ndarray
     """(N,) int8: side of each robot's shortest way, +1 left, -1 right; 0 = nobody looked, or there is none."""
     queue_due: np.ndarray
@@ -265,7 +274,12 @@ def new_sim(
         robots=robots,
         percepts=swarm.percepts,
         decisions=swarm.decisions,
-        ranges=swarm.scans,
+        ranges=swarm.scans if rig.sensor.field == 0 else np.zeros((n, rig.sensor.field), np.float32),
+        scans=swarm.scans,
+        first_beam=rig.sensor.first,
+        sight=np.zeros((n, 1), np.float32),
+        straight_cos=np.ones(1),
+        straight_sin=np.zeros(1),
         told=np.zeros(n, np.int8),
         queue_due=np.zeros((n, QUEUE)),
         queue_length=np.zeros((n, QUEUE), np.int64),

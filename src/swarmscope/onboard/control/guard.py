@@ -20,14 +20,32 @@ from swarmscope.geometry import point_segment_distance
 from swarmscope.onboard.control.horizon import horizon_speed
 from swarmscope.onboard.control.unicycle import ramp
 from swarmscope.onboard.percept import MAX_NEIGHBOURS, PEERS, Row
+from swarmscope.onboard.perception.frames import in_view, was_free
 from swarmscope.onboard.perception.mend import body_and_clearance, least_range
+from swarmscope.onboard.reasons import (
+    R_HELD_BLIND,
+    R_HELD_CORNER,
+    R_HELD_NO_NUMBER,
+    R_HELD_ROBOT,
+    R_HELD_THING,
+    R_HELD_UNSEEN,
+)
 from swarmscope.onboard.rig import Rig
-from swarmscope.onboard.sharing.tracks import neighbour_reach
+from swarmscope.onboard.sharing.tracks import near_track
 from swarmscope.onboard.view import View
 
 STEPS = 4
 """Straight pieces that stand for the arc driven until the next tick."""
 FRACTIONS = (1.0, 0.8, 0.6, 0.4, 0.2, 0.1, 0.05, 0.0)
+FREE = -1
+STANDS_MPS = 1e-6
+SOME_LOSSES, MOST_LOSSES = 0.2, 0.35
+"""Shares of returns lost from scan to scan from which on a robot slows down, and at which it stands. Of beams lost by
+chance with probability p a share p^3 is lost together with both beams beside them."""
+LOOK_SHARE = 0.4
+"""Of the field of view, by which a robot that looks round turns in a tick."""
+FRONT, FRONT_RAD = 5, 1.8
+"""The front of the body is looked at in so many places to either side, up to this angle [rad]."""
 
 
 class Way(NamedTuple):
@@ -48,32 +66,85 @@ class Way(NamedTuple):
     """Whether it is not straight."""
 
 
+class Near(NamedTuple):
+    """What could matter in this tick."""
+
+    beams: int
+    """How many, listed in ``View.edges``."""
+    need: float
+    """How far the centre keeps off it [m]."""
+
+
 @jit
 def guard(see: View) -> bool:
     """Lower the speed that was decided until it is safe; return whether it had to.
 
-    ``see.edges`` is scratch. What is no number, and time that does not pass, brake.
+    A robot that it lets stand says why. What is no number, time that does not pass, and a LiDAR that has gone blind
+    brake. ``see.edges`` is scratch.
     """
-    percept, body, guarding = see.percept, see.rig.body, see.rig.guarding
-    dt, speed = percept["dt_s"], percept["speed"]
-    if not (0.0 < dt < math.inf and abs(speed) < math.inf and abs(percept["compass"]) < math.inf):
-        see.out["v"], see.out["w"] = 0.0, 0.0
+    percept, rig, out = see.percept, see.rig, see.out
+    asked, w = out["v"], out["w"]
+    why = _unfit(see)
+    if why != FREE:
+        out["v"], out["w"] = 0.0, 0.0
+        out["reason"] = why
         return True
-    asked, w = see.out["v"], see.out["w"]
-    if not (abs(asked) < math.inf and abs(w) < math.inf):
-        asked, w = 0.0, 0.0
-    w = min(body.w_max_radps, max(-body.w_max_radps, w))
-    asked = min(body.v_max_mps, max(0.0, asked))
+    w = min(rig.body.w_max_radps, max(-rig.body.w_max_radps, w))
+    asked = min(rig.body.v_max_mps, max(0.0, asked))
+    v, w, why = _allowed(see, asked, w)
+    if rig.sensor.field > 0 and percept["speed"] <= STANDS_MPS:
+        v, w, why = _look_round(see, v, w, why)
+    out["v"], out["w"] = v, w
+    if why != FREE and v == 0.0 and percept["speed"] <= STANDS_MPS:
+        out["reason"] = why
+    return bool(v < asked)
+
+
+@jit_inner
+def _unfit(see: View) -> int:
+    """Return why no command can be trusted, FREE when it can."""
+    percept, shared, dt, speed = see.percept, see.shared, see.percept["dt_s"], see.percept["speed"]
+    if not (0.0 < dt < math.inf and abs(speed) < math.inf and abs(percept["compass"]) < math.inf):
+        return R_HELD_NO_NUMBER
+    if not (abs(see.out["v"]) < math.inf and abs(see.out["w"]) < math.inf):
+        return R_HELD_NO_NUMBER
+    if shared["blind_s"] >= see.rig.guarding.blind_s or shared["losses"] >= MOST_LOSSES:
+        return R_HELD_BLIND
+    return FREE
+
+
+@jit_inner
+def _allowed(see: View, asked: float, w: float) -> tuple[float, float, int]:
+    """Return the fastest command up to ``asked`` [m/s] that passes, its turn rate, and why it is not faster."""
+    percept, body = see.percept, see.rig.body
+    dt, speed = percept["dt_s"], percept["speed"]
     wanted = min(asked, _horizon_speed(see.rig, dt))
-    count, nearest = _near_beams(see, max(speed, min(wanted, speed + body.a_max_mps2 * dt)))
-    need = min(body.radius_m + guarding.clearance_m, nearest - 1e-6)  # already too close: never closer
+    if see.shared["losses"] > SOME_LOSSES:
+        wanted *= (MOST_LOSSES - see.shared["losses"]) / (MOST_LOSSES - SOME_LOSSES)
+    near = _near(see, max(speed, min(wanted, speed + body.a_max_mps2 * dt)))
+    why = FREE
     for fraction in FRACTIONS:
         v = wanted * fraction
-        if _passes(see, v, w, count, need):
-            see.out["v"], see.out["w"] = v, w
-            return bool(v < asked)
-    see.out["v"], see.out["w"] = 0.0, 0.0 if speed > 1e-6 else w
-    return True
+        held = _held_by(see, v, w, near)
+        if held == FREE:
+            return v, w, why
+        why = held
+    return 0.0, w if speed <= STANDS_MPS else 0.0, why
+
+
+@jit_inner
+def _look_round(see: View, v: float, w: float, why: int) -> tuple[float, float, int]:
+    """Return the command of a robot of limited view that stands, and why: it turns once round where it has not seen
+    what is beside its way, so slowly that scans overlap."""
+    shared, field = see.shared, see.rig.sensor.increment * see.rig.sensor.field
+    if shared["look_rad"] > 0.0:
+        shared["look_rad"] -= abs(see.percept["odom_yaw"])
+    elif why == R_HELD_UNSEEN and v == 0.0:
+        shared["look_rad"] = 2.0 * math.pi - 0.5 * field
+    if not shared["look_rad"] > 0.0:
+        return v, w, why
+    turn = min(see.rig.body.w_max_radps, LOOK_SHARE * field / see.percept["dt_s"])
+    return 0.0, turn if shared["unseen_left"] else -turn, R_HELD_UNSEEN
 
 
 @jit_inner
@@ -86,11 +157,8 @@ def _horizon_speed(rig: Rig, dt: float) -> float:
 
 
 @jit_inner
-def _near_beams(see: View, speed: float) -> tuple[int, float]:
-    """Collect the beams that could matter for a robot that is at most so fast until the next tick, into ``see.edges``.
-
-    Return how many, and the smallest range among them [m].
-    """
+def _near(see: View, speed: float) -> Near:
+    """Collect what could matter for a robot that is at most so fast until the next tick."""
     rig, ranges, near = see.rig, see.scan, see.edges
     body, guarding = rig.body, rig.guarding
     delay = see.percept["dt_s"] + guarding.latency_s
@@ -108,7 +176,8 @@ def _near_beams(see: View, speed: float) -> tuple[int, float]:
             count += 1
             if least <= ranges[n] < nearest:
                 nearest = ranges[n]
-    return count, nearest
+    need = min(body.radius_m + guarding.clearance_m, nearest - 1e-6)  # already too close: never closer
+    return Near(count, need)
 
 
 @jit_inner
@@ -131,35 +200,92 @@ def _way(speed: float, v: float, w: float, see: View) -> Way:
 
 
 @jit_inner
-def _passes(see: View, v: float, w: float, count: int, need: float) -> bool:
-    """Tell whether commanding (v, w) keeps ``need`` [m] off every near return, and out of others' halves."""
+def _held_by(see: View, v: float, w: float, near: Near) -> int:
+    """Return what holds a robot back from the command (v, w): FREE, or the reason.
+
+    The way keeps ``near.need`` off every return, out of others' halves, and within what was seen.
+    """
     rig, percept = see.rig, see.percept
     speed = percept["speed"]
     way = _way(speed, v, w, see)
-    if way.x5 * way.x5 + way.y5 * way.y5 + way.brake < 1e-10 and speed < 1e-6:
-        return True
+    if way.x5 * way.x5 + way.y5 * way.y5 + way.brake < 1e-10 and speed < STANDS_MPS:
+        return FREE
     alone = not rig.guarding.others_mps > 0.0
     met = _met_by(v, percept["dt_s"], rig)
     if not alone and not _clear_of_tracks(see, way, met):
-        return False
-    beyond = _listed_up_to(percept, rig)
-    total = rig.sensor.beams
-    for k in range(count):
-        n = see.edges[k]
-        s = see.scan[n]
-        if not s >= least_range(rig):
-            s = body_and_clearance(rig)
-        px, py = s * rig.cos[n], s * rig.sin[n]
-        if _closer(px, py, way, need) or (way.turns and _shadowed(px, py, rig.cos[n], rig.sin[n], way, need)):
-            return False
-        if alone:
-            continue
-        if s > beyond or _point_gap(percept, see.shared, px, py, rig):
-            if not _in_own_half(px, py, s, way, met, rig):
-                return False
-        elif _is_corner(see.scan, n, total, rig) and not _stops_before(px, py, s, way, met, rig):
-            return False
-    return True
+        return R_HELD_ROBOT
+    for k in range(near.beams):
+        held = _held_by_beam(see, see.edges[k], way, met, near.need)
+        if held != FREE:
+            return held
+    if rig.sensor.field > 0:
+        x, y = _out_of_sight(see, way, near.need)
+        if x != 0.0 or y != 0.0:
+            see.shared["unseen_left"] = y > 0.0
+            return R_HELD_UNSEEN
+    return FREE
+
+
+@jit_inner
+def _held_by_beam(see: View, n: int, way: Way, met: float, need: float) -> int:
+    """Return how the return of beam n, or who may come out from behind it, forbids a way: FREE, or the reason."""
+    rig, percept, s = see.rig, see.percept, see.scan[n]
+    if not s >= least_range(rig):
+        s = body_and_clearance(rig)
+    px, py = s * rig.cos[n], s * rig.sin[n]
+    if _closer(px, py, way, need) or (way.turns and _shadowed(px, py, rig.cos[n], rig.sin[n], way, need)):
+        return R_HELD_THING
+    if not rig.guarding.others_mps > 0.0:
+        return FREE
+    if s > _listed_up_to(percept, rig) or near_track(percept, see.shared, px, py, rig):
+        return FREE if _in_own_half(px, py, s, way, met, rig) else R_HELD_ROBOT
+    if _is_corner(see.scan, n, rig) and not _stops_before(px, py, s, way, met, rig):
+        return R_HELD_CORNER
+    return FREE
+
+
+@jit_inner
+def _out_of_sight(see: View, way: Way, need: float) -> tuple[float, float]:
+    """Return a place that the body would sweep and that nobody has seen free [m], (0, 0) when there is none."""
+    x0, y0 = 0.0, 0.0
+    for piece in range(5):
+        x1, y1 = _corner_of(way, piece)
+        length = math.sqrt((x1 - x0) ** 2 + (y1 - y0) ** 2)
+        if length > 1e-9:
+            fx, fy = need * (x1 - x0) / length, need * (y1 - y0) / length
+            stops = int(math.ceil(length / (0.5 * need)))
+            for k in range(1, stops + 1):
+                part = k / stops
+                x, y = _unseen_front(see, x0 + part * (x1 - x0), y0 + part * (y1 - y0), fx, fy)
+                if x != 0.0 or y != 0.0:
+                    return x, y
+        x0, y0 = x1, y1
+    return 0.0, 0.0
+
+
+@jit_inner
+def _unseen_front(see: View, x: float, y: float, fx: float, fy: float) -> tuple[float, float]:
+    """Return a place on the front of the body at (x, y), which looks along f [m], that nobody has seen free."""
+    for k in range(-FRONT, FRONT + 1):
+        a = k * FRONT_RAD / FRONT
+        px, py = x + fx * math.cos(a) - fy * math.sin(a), y + fx * math.sin(a) + fy * math.cos(a)
+        if not in_view(px, py, see) and not was_free(see, px, py):
+            return px, py
+    return 0.0, 0.0
+
+
+@jit_inline
+def _corner_of(way: Way, piece: int) -> tuple[float, float]:
+    """Return where piece 0 to 4 of a way ends."""
+    if piece == 0:
+        return way.x1, way.y1
+    if piece == 1:
+        return way.x2, way.y2
+    if piece == 2:
+        return way.x3, way.y3
+    if piece == 3:
+        return way.x4, way.y4
+    return way.x5, way.y5
 
 
 @jit_inline
@@ -203,29 +329,14 @@ def _listed_up_to(percept: Row, rig: Rig) -> float:
 
 
 @jit_inner
-def _point_gap(percept: Row, shared: Row, px: float, py: float, rig: Rig) -> bool:
-    """Tell whether the return at (px, py), body frame, may belong to a neighbour."""
-    c, s = math.cos(percept["compass"]), math.sin(percept["compass"])
-    gx, gy = c * px - s * py, s * px + c * py
-    for t in range(PEERS):
-        if shared["track_id"][t] < 0:
-            continue
-        ex, ey = gx - shared["track_x"][t], gy - shared["track_y"][t]
-        reach = neighbour_reach(math.sqrt(shared["track_x"][t] ** 2 + shared["track_y"][t] ** 2), rig)
-        if ex * ex + ey * ey <= reach * reach:
-            return True
-    return False
-
-
-@jit_inner
-def _is_corner(ranges: np.ndarray, n: int, total: int, rig: Rig) -> bool:
+def _is_corner(ranges: np.ndarray, n: int, rig: Rig) -> bool:
     """Tell whether a robot can come into view past the return of beam n: beside it there is room for one behind it."""
     room = ranges[n] + 2.0 * (rig.body.radius_m + rig.guarding.clearance_m)
     after, before = n + 1, n - 1
-    if after == total:
+    if after == ranges.size:
         after = 0 if rig.sensor.wraps else n
     if before < 0:
-        before = total - 1 if rig.sensor.wraps else n
+        before = ranges.size - 1 if rig.sensor.wraps else n
     return bool(ranges[after] > room or ranges[before] > room)
 
 

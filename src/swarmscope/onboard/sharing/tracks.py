@@ -176,3 +176,18 @@ def neighbour_reach(distance: float, rig: Rig) -> float:
     """Return how far from a neighbour's estimated centre its returns may lie [m], errors included."""
     noise = rig.sensor.position_sigma + rig.sensor.range_sigma
     return rig.body.radius_m + 0.06 + 2.0 * noise * distance
+
+
+@jit
+def near_track(percept: Row, shared: Row, px: float, py: float, rig: Rig) -> bool:
+    """Tell whether the return at (px, py), body frame, may belong to a neighbour."""
+    c, s = math.cos(percept["compass"]), math.sin(percept["compass"])
+    gx, gy = c * px - s * py, s * px + c * py
+    for t in range(PEERS):
+        if shared["track_id"][t] < 0:
+            continue
+        ex, ey = gx - shared["track_x"][t], gy - shared["track_y"][t]
+        reach = neighbour_reach(math.sqrt(shared["track_x"][t] ** 2 + shared["track_y"][t] ** 2), rig)
+        if ex * ex + ey * ey <= reach * reach:
+            return True
+    return False

@@ -1,0 +1,155 @@
+"""What a limited field of view has seen on the way: a few scans, each with where it was taken.
+
+What lies beside a robot that sees only ahead was ahead of it a moment ago. Planners are shown it in a scan of the full
+circle, open where nothing is known. The guard asks what is known (docs/safety.md): a place has been seen free if one of
+the scans reached beyond it, or if the body has stood there.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from swarmscope._jit import jit, jit_inline, jit_inner
+from swarmscope.geometry import wrap_angle
+from swarmscope.onboard.percept import Row
+from swarmscope.onboard.perception.mend import body_and_clearance
+from swarmscope.onboard.sharing.tracks import near_track
+from swarmscope.onboard.view import View
+
+STEP_RADII = 0.4
+"""After a way of so many radii another scan is kept, ..."""
+STEP_SHARE = 0.4
+"""... or after a turn by this share of the field of view."""
+SAME_RADII, SAME_SHARE = 0.2, 0.15
+"""A scan kept from this close by, turned by less than this share of the field, gives way to the new one."""
+
+
+@jit
+def look_back(see: View) -> None:
+    """Fill the beams out of view with the nearest of what the kept scans show there.
+
+    The scan as measured goes into ``see.filtered``, scratch, for ``keep_frame``.
+    """
+    sensor, shared = see.rig.sensor, see.shared
+    first, last = sensor.first, sensor.first + sensor.field - 1
+    for n in range(first, last + 1):
+        see.filtered[n] = see.scan[n]
+    while first < last and not see.scan[first] >= 0.0:  # a sensor off the centre leaves some at the edges unknown
+        first += 1
+    while last > first and not see.scan[last] >= 0.0:
+        last -= 1
+    shared["view_first"], shared["view_last"] = first, last
+    for n in range(sensor.beams):
+        if not first <= n <= last:
+            see.scan[n] = math.inf
+    _move_on(see.percept, see.frames.poses)
+    for k in range(shared["frames_n"]):
+        _draw(see, see.frames.scans[k], see.frames.poses[k])
+
+
+@jit_inner
+def _move_on(percept: Row, poses: np.ndarray) -> None:
+    """Express where scans were taken in the body frame of now."""
+    dx, dy, turned = percept["odom_x"], percept["odom_y"], percept["odom_yaw"]
+    c, s = math.cos(turned), math.sin(turned)
+    for k in range(len(poses)):
+        x, y = poses[k, 0] - dx, poses[k, 1] - dy
+        poses[k, 0], poses[k, 1] = c * x + s * y, c * y - s * x
+        poses[k, 2] = wrap_angle(poses[k, 2] - turned)
+
+
+@jit_inner
+def _draw(see: View, scan: np.ndarray, pose: np.ndarray) -> None:
+    """Lower the beams out of view to what a kept scan shows there."""
+    sensor, shared = see.rig.sensor, see.shared
+    c, si = math.cos(pose[2]), math.sin(pose[2])
+    for j in range(scan.size):
+        s = scan[j]
+        if not 0.0 < s < sensor.range_max:
+            continue
+        ux, uy = see.rig.cos[sensor.first + j], see.rig.sin[sensor.first + j]
+        x, y = pose[0] + s * (c * ux - si * uy), pose[1] + s * (si * ux + c * uy)
+        n = int(math.floor((math.atan2(y, x) - sensor.angle_min) / sensor.increment + 0.5)) % sensor.beams
+        if shared["view_first"] <= n <= shared["view_last"]:
+            continue
+        distance = math.sqrt(x * x + y * y)
+        see.scan[n] = min(see.scan[n], distance)
+
+
+@jit
+def keep_frame(see: View) -> None:
+    """Keep the scan, which has been mended since ``look_back``, if it shows something new."""
+    at = _slot(see)
+    if at < 0:
+        return
+    see.shared["frames_n"] = max(see.shared["frames_n"], at + 1)
+    see.shared["frame_at"] = at
+    for k in range(3):
+        see.frames.poses[at, k] = 0.0
+    _copy(see, see.frames.scans[at])
+
+
+@jit_inner
+def _slot(see: View) -> int:
+    """Return where this scan is to be kept, -1 when it shows nothing new."""
+    poses, used, last = see.frames.poses, see.shared["frames_n"], see.shared["frame_at"]
+    radius, field = see.rig.body.radius_m, see.rig.sensor.increment * see.rig.sensor.field
+    if used == 0:
+        return 0
+    moved = math.sqrt(poses[last, 0] ** 2 + poses[last, 1] ** 2)
+    if moved < STEP_RADII * radius and abs(poses[last, 2]) < STEP_SHARE * field:
+        return -1
+    for k in range(used):
+        moved = math.sqrt(poses[k, 0] ** 2 + poses[k, 1] ** 2)
+        if moved < SAME_RADII * radius and abs(poses[k, 2]) < SAME_SHARE * field:
+            return k
+    return (last + 1) % len(poses) if used == len(poses) else int(used)
+
+
+@jit_inner
+def _copy(see: View, out: np.ndarray) -> None:
+    """Keep the scan: negative where the return may be a neighbour's (free up to there), NaN where nothing is known.
+
+    What was broken counts as seen where it was bridged, not where the hole was so wide that it blocks.
+    """
+    rig, touching = see.rig, body_and_clearance(see.rig) + 1e-5
+    for j in range(out.size):
+        n = rig.sensor.first + j
+        s = see.scan[n]
+        if not see.shared["view_first"] <= n <= see.shared["view_last"]:
+            out[j] = math.nan
+        elif not see.filtered[n] >= 0.0:
+            out[j] = -s if touching < s < math.inf else math.nan
+        elif s < rig.sensor.range_max and near_track(see.percept, see.shared, s * rig.cos[n], s * rig.sin[n], rig):
+            out[j] = -s
+        else:
+            out[j] = s
+
+
+@jit_inline
+def in_view(x: float, y: float, see: View) -> bool:
+    """Tell whether the point (x, y), body frame, lies between the first and the last beam."""
+    beam = (math.atan2(y, x) - see.rig.sensor.angle_min) / see.rig.sensor.increment
+    if beam < 0.0:
+        beam += 2.0 * math.pi / see.rig.sensor.increment
+    return bool(see.shared["view_first"] <= beam <= see.shared["view_last"])
+
+
+@jit
+def was_free(see: View, x: float, y: float) -> bool:
+    """Tell whether the point (x, y), body frame [m], outside the view, has been seen free."""
+    sensor, core = see.rig.sensor, see.rig.body.radius_m
+    if x * x + y * y < core * core:
+        return True
+    for k in range(see.shared["frames_n"]):
+        pose = see.frames.poses[k]
+        px, py = x - pose[0], y - pose[1]
+        if px * px + py * py < core * core:
+            return True
+        bearing = math.atan2(py, px) - pose[2]
+        n = int(math.floor((bearing - sensor.angle_min) / sensor.increment + 0.5)) % sensor.beams - sensor.first
+        if 0 <= n < sensor.field and px * px + py * py <= see.frames.scans[k, n] ** 2:
+            return True
+    return False
