@@ -13,7 +13,7 @@ import numpy as np
 
 from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.geometry import wrap_angle
-from swarmscope.onboard.percept import Row
+from swarmscope.onboard.percept import PEERS, Row
 from swarmscope.onboard.perception.mend import body_and_clearance
 from swarmscope.onboard.sharing.tracks import near_track
 from swarmscope.onboard.view import View
@@ -47,6 +47,9 @@ def look_back(see: View) -> None:
     _move_on(see.percept, see.frames.poses)
     for k in range(shared["frames_n"]):
         _draw(see, see.frames.scans[k], see.frames.poses[k])
+    for t in range(PEERS):
+        if shared["track_id"][t] >= 0:
+            _draw_neighbour(see, t)
 
 
 @jit_inner
@@ -76,6 +79,27 @@ def _draw(see: View, scan: np.ndarray, pose: np.ndarray) -> None:
             continue
         distance = math.sqrt(x * x + y * y)
         see.scan[n] = min(see.scan[n], distance)
+
+
+@jit_inner
+def _draw_neighbour(see: View, t: int) -> None:
+    """Lower the beams out of view that would meet the neighbour of track ``t``."""
+    sensor, shared, radius = see.rig.sensor, see.shared, see.rig.body.radius_m
+    x, y = shared["track_x"][t], shared["track_y"][t]
+    d = math.sqrt(x * x + y * y)
+    if not radius < d < sensor.range_max:
+        return
+    middle = (math.atan2(y, x) - see.percept["compass"] - sensor.angle_min) / sensor.increment
+    spread = math.asin(radius / d) / sensor.increment
+    for k in range(int(math.ceil(middle - spread)), int(math.floor(middle + spread)) + 1):
+        n = k % sensor.beams
+        if shared["view_first"] <= n <= shared["view_last"]:
+            continue
+        off = (k - middle) * sensor.increment
+        across = d * math.sin(off)
+        s = d * math.cos(off) - math.sqrt(max(0.0, radius * radius - across * across))
+        if s < see.scan[n]:
+            see.scan[n] = s
 
 
 @jit
