@@ -33,7 +33,9 @@ def all_round(sensor: Sensor) -> Sensor:
     """
     if sensor.wraps:
         return sensor
-    beams = max(sensor.beams, int(2.0 * math.pi / sensor.increment + 1e-6))
+    beams = int(2.0 * math.pi / sensor.increment + 1e-6)
+    if beams <= sensor.beams:  # nothing fits between the last and the first
+        return sensor._replace(wraps=True)
     first = (beams - sensor.beams) // 2
     return sensor._replace(
         beams=beams,

@@ -14,8 +14,8 @@ from swarmscope.sim.lidar import Beams, cast_disc, cast_static
 from swarmscope.sim.state import Sim
 from swarmscope.sim.streams import BEARING_NOISE, RANGE_NOISE, key, mix, normal
 
-SIGHT_SLACK = 0.05
-"""A neighbour is in sight when the beam towards its centre ends at most this short of its surface [m]."""
+SIGHT_SLACK = 1e-3
+"""A neighbour is in sight when a beam ends at most this short of its surface [m]."""
 
 
 @jit
@@ -90,8 +90,8 @@ def _insert(percept: Row, found: int, j: int, bx: float, by: float) -> int:
 
 @jit_inner
 def _keep_visible(sim: Sim, tick: int, i: int, found: int) -> None:
-    """Keep the neighbours in line of sight by robot i's own (noise-free) scan; add the sensor's errors."""
-    percept, ranges, beams, noise = sim.percepts[i], sim.ranges[i], sim.beams, sim.noise
+    """Keep the neighbours of which robot i's own (noise-free) scan shows something; add the sensor's errors."""
+    percept, beams, noise = sim.percepts[i], sim.beams, sim.noise
     ids, xs, ys = percept["neighbour_id"], percept["neighbour_x"], percept["neighbour_y"]
     error = compass_error(sim, tick, i)
     kept = 0
@@ -99,13 +99,7 @@ def _keep_visible(sim: Sim, tick: int, i: int, found: int) -> None:
         j, x, y = ids[k], xs[k], ys[k]
         distance = math.sqrt(x * x + y * y)
         bearing = math.atan2(y, x)
-        n = int(math.floor((bearing - beams.angle_min) / beams.increment + 0.5))
-        if beams.wraps:
-            n = n % ranges.size
-        if 0 <= n < ranges.size:
-            if ranges[n] < distance - sim.radius - SIGHT_SLACK:
-                continue
-        elif not _in_sight(sim, i, j, found):
+        if not (_shows(sim, i, distance, bearing) or (not beams.wraps and _in_sight(sim, i, j, found))):
             continue
         if noise.range_fraction > 0.0 or noise.bearing_rad > 0.0:
             bits = mix(key(sim.clock.seed, i, tick, RANGE_NOISE) + key(0, j, 0, RANGE_NOISE))
@@ -121,8 +115,26 @@ def _keep_visible(sim: Sim, tick: int, i: int, found: int) -> None:
 
 
 @jit_inner
+def _shows(sim: Sim, i: int, distance: float, bearing: float) -> bool:
+    """Tell whether a beam of robot i's noise-free scan ends on a robot at ``distance`` [m] and ``bearing`` [rad]."""
+    beams, ranges, radius = sim.beams, sim.ranges[i], sim.radius
+    middle = (bearing - beams.angle_min) / beams.increment
+    spread = math.asin(min(1.0, radius / max(distance, 1e-9))) / beams.increment
+    for k in range(int(math.ceil(middle - spread)), int(math.floor(middle + spread)) + 1):
+        n = k % ranges.size if beams.wraps else k
+        if not 0 <= n < ranges.size:
+            continue
+        off = (k - middle) * beams.increment
+        across = distance * math.sin(off)
+        surface = distance * math.cos(off) - math.sqrt(max(0.0, radius * radius - across * across))
+        if surface <= beams.range_max and ranges[n] >= surface - SIGHT_SLACK:
+            return True
+    return False
+
+
+@jit_inner
 def _in_sight(sim: Sim, i: int, j: int, found: int) -> bool:
-    """Tell whether nothing stands between robots i and j, where the LiDAR does not look.
+    """Tell whether nothing stands between the centres of robots i and j, where the LiDAR need not look.
 
     Mutual positioning is a sensor of its own: it works all round. Who could be in between is among the first ``found``
     neighbours of the list, kept ones first.

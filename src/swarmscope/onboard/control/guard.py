@@ -38,6 +38,8 @@ STEPS = 4
 """Straight pieces that stand for the arc driven until the next tick."""
 FRACTIONS = (1.0, 0.8, 0.6, 0.4, 0.2, 0.1, 0.05, 0.0)
 FREE = -1
+ROUNDING_M = 0.0005
+"""Of ranges and of motion."""
 STANDS_MPS = 1e-6
 SOME_LOSSES, MOST_LOSSES = 0.2, 0.35
 """Shares of returns lost from scan to scan from which on a robot slows down, and at which it stands. Of beams lost by
@@ -71,8 +73,8 @@ class Near(NamedTuple):
 
     beams: int
     """How many, listed in ``View.edges``."""
-    need: float
-    """How far the centre keeps off it [m]."""
+    nearest: float
+    """The smallest range among them [m]."""
 
 
 @jit
@@ -176,8 +178,7 @@ def _near(see: View, speed: float) -> Near:
             count += 1
             if least <= ranges[n] < nearest:
                 nearest = ranges[n]
-    need = min(body.radius_m + guarding.clearance_m, nearest - 1e-6)  # already too close: never closer
-    return Near(count, need)
+    return Near(count, nearest)
 
 
 @jit_inner
@@ -203,7 +204,7 @@ def _way(speed: float, v: float, w: float, see: View) -> Way:
 def _held_by(see: View, v: float, w: float, near: Near) -> int:
     """Return what holds a robot back from the command (v, w): FREE, or the reason.
 
-    The way keeps ``near.need`` off every return, out of others' halves, and within what was seen.
+    The way keeps clear of every return, out of others' halves, and within what was seen.
     """
     rig, percept = see.rig, see.percept
     speed = percept["speed"]
@@ -214,16 +215,31 @@ def _held_by(see: View, v: float, w: float, near: Near) -> int:
     met = _met_by(v, percept["dt_s"], rig)
     if not alone and not _clear_of_tracks(see, way, met):
         return R_HELD_ROBOT
+    need = min(_distance_kept(v, w, see), near.nearest - 1e-6)  # already too close: never closer
     for k in range(near.beams):
-        held = _held_by_beam(see, see.edges[k], way, met, near.need)
+        held = _held_by_beam(see, see.edges[k], way, met, need)
         if held != FREE:
             return held
     if rig.sensor.field > 0:
-        x, y = _out_of_sight(see, way, near.need)
+        x, y = _out_of_sight(see, way, need)
         if x != 0.0 or y != 0.0:
             see.shared["unseen_left"] = y > 0.0
             return R_HELD_UNSEEN
     return FREE
+
+
+@jit_inline
+def _distance_kept(v: float, w: float, see: View) -> float:
+    """Return how far the centre keeps off returns [m].
+
+    The clearance, or more where it does not cover what shows between two beams beside the body, and how far an arc
+    bulges out of the straight pieces that stand for it.
+    """
+    body, step = see.rig.body, see.percept["dt_s"] / STEPS
+    hidden = 0.5 * see.rig.sensor.increment * body.radius_m + ROUNDING_M
+    bulge = 0.125 * max(v, see.percept["speed"]) * abs(w) * step * step
+    kept: float = body.radius_m + max(see.rig.guarding.clearance_m, hidden + bulge)
+    return kept
 
 
 @jit_inner

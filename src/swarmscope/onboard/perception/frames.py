@@ -98,8 +98,7 @@ def _draw_neighbour(see: View, t: int) -> None:
         off = (k - middle) * sensor.increment
         across = d * math.sin(off)
         s = d * math.cos(off) - math.sqrt(max(0.0, radius * radius - across * across))
-        if s < see.scan[n]:
-            see.scan[n] = s
+        see.scan[n] = min(see.scan[n], s)
 
 
 @jit
