@@ -27,7 +27,7 @@ NEVER_S = -1e9
 
 PERCEPT = np.dtype(
     [
-        ("now_s", np.float64),  # the robot's own clock [s]
+        ("now_s", np.float64),  # the robot's own clock, after ``perceive`` without its jumps [s]
         ("dt_s", np.float64),  # time until the next tick [s]
         ("goal_bearing", np.float64),  # of the goal, body frame [rad]
         ("goal_distance", np.float64),  # [m]
@@ -126,6 +126,8 @@ SHARED = np.dtype(
         ("dropped_bad", np.int64),  # torn, corrupt or foreign packets
         ("dropped_stale", np.int64),  # old, replayed or unasked-for packets
         ("started", np.uint8),
+        ("clock_s", np.float64),  # what the clock said at the last tick
+        ("ahead_s", np.float64),  # by how much it has jumped, forward positive
         ("compass", np.float64),  # of the last tick
         ("goal_x", np.float64),  # body frame of the last tick [m]
         ("goal_y", np.float64),

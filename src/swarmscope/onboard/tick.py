@@ -8,6 +8,7 @@ from __future__ import annotations
 from swarmscope._jit import jit, jit_paste
 from swarmscope.onboard.control.guard import guard
 from swarmscope.onboard.perception.bearings import steady
+from swarmscope.onboard.perception.clock import keep_time
 from swarmscope.onboard.perception.features import align_features, extrema
 from swarmscope.onboard.perception.filters import filter_padded, prepare_scan
 from swarmscope.onboard.perception.mend import mend
@@ -26,6 +27,7 @@ def perceive(see: View, still_s: float) -> None:
     """
     see.out["n_out"] = 0
     see.out["fused"] = 0
+    keep_time(see.percept, see.shared)
     steady(see.percept, see.shared)
     dx, dy = update_odometry(see.percept, see.shared)
     read_inbox(see)

@@ -123,7 +123,7 @@ class FaultsModel(_Strict):
     clock_jumps_per_h: Rate = FAULTS.clock_jumps_per_h
     """How often a robot's own clock jumps, to and fro alike often [1/h]."""
     clock_jump_s: Duration = FAULTS.clock_jump_s
-    """How far it jumps; by that much longer a robot may wait, for what its planner waits for, after a jump back [s]."""
+    """How far it jumps; robots take out what cannot be time that has passed [s]."""
 
 
 class RadioModel(_Strict):
