@@ -35,6 +35,9 @@ PERCEPT = np.dtype(
         ("odom_x", np.float64),  # motion since the last tick, in the body frame of the last tick [m]
         ("odom_y", np.float64),
         ("odom_yaw", np.float64),  # [rad]
+        ("scan_x", np.float64),  # where the body was when the scan was taken, by odometry, body frame of now [m]
+        ("scan_y", np.float64),
+        ("scan_yaw", np.float64),  # [rad]
         ("compass", np.float64),  # own heading, compass frame [rad]
         ("id", np.int64),  # own radio address
         ("boot", np.int64),  # drawn anew at every start, 0 to 65535

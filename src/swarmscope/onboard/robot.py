@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from swarmscope.geometry import Pose
 from swarmscope.onboard.body import Body
 from swarmscope.onboard.data_sheets import (
     BOOTS,
@@ -42,7 +43,7 @@ from swarmscope.onboard.planners import Planner
 from swarmscope.onboard.reasons import STATE_NAMES
 from swarmscope.onboard.rows import Rows
 from swarmscope.onboard.scans import STALE_PERIODS, Scans
-from swarmscope.onboard.trail import Pose, Trail, then
+from swarmscope.onboard.trail import Trail, then
 from swarmscope.onboard.warm import WarmUp, warm_up
 
 __all__ = ["Command", "Lidar", "Robot", "Seen", "WarmUp"]

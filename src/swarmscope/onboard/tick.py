@@ -12,6 +12,7 @@ from swarmscope.onboard.perception.clock import keep_time
 from swarmscope.onboard.perception.features import align_features, extrema
 from swarmscope.onboard.perception.filters import filter_padded, prepare_scan
 from swarmscope.onboard.perception.mend import mend
+from swarmscope.onboard.perception.reproject import move_on
 from swarmscope.onboard.perception.safety import safe_directions
 from swarmscope.onboard.rig import AHEAD, PRINTED
 from swarmscope.onboard.sharing.inbox import answer_all, read_inbox
@@ -32,6 +33,7 @@ def perceive(see: View, still_s: float) -> None:
     dx, dy = update_odometry(see.percept, see.shared)
     read_inbox(see)
     update_tracks(see.percept, see.shared, see.rig, dx, dy)
+    move_on(see)
     mend(see.scan, see.rig)
     mask_moving_neighbours(see, still_s)
     safe_directions(see.masked, see.rig.sensor, see.reach[AHEAD], see.edges, see.safe)
