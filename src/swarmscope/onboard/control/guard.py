@@ -22,7 +22,7 @@ from swarmscope.onboard.control.unicycle import ramp
 from swarmscope.onboard.percept import MAX_NEIGHBOURS, PEERS, Row
 from swarmscope.onboard.perception.mend import body_and_clearance, least_range
 from swarmscope.onboard.rig import Rig
-from swarmscope.onboard.sharing.tracks import neighbour_reach
+from swarmscope.onboard.sharing.tracks import neighbour_reach, returns_of
 from swarmscope.onboard.view import View
 
 STEPS = 4
@@ -52,7 +52,7 @@ class Way(NamedTuple):
 def guard(see: View) -> bool:
     """Lower the speed that was decided until it is safe; return whether it had to.
 
-    ``see.edges`` is scratch. What is no number, and time that does not pass, brake.
+    ``see.edges`` and ``see.other`` are scratch. What is no number, and time that does not pass, brake.
     """
     percept, body, guarding = see.percept, see.rig.body, see.rig.guarding
     dt, speed = percept["dt_s"], percept["speed"]
@@ -67,6 +67,7 @@ def guard(see: View) -> bool:
     wanted = min(asked, _horizon_speed(see.rig, dt))
     count, nearest = _near_beams(see, max(speed, min(wanted, speed + body.a_max_mps2 * dt)))
     need = min(body.radius_m + guarding.clearance_m, nearest - 1e-6)  # already too close: never closer
+    _measure_gaps(see)
     for fraction in FRACTIONS:
         v = wanted * fraction
         if _passes(see, v, w, count, need):
@@ -74,6 +75,28 @@ def guard(see: View) -> bool:
             return bool(v < asked)
     see.out["v"], see.out["w"] = 0.0, 0.0 if speed > 1e-6 else w
     return True
+
+
+@jit_inner
+def _measure_gaps(see: View) -> None:
+    """Write how far the body of each track's neighbour is at least [m] into ``see.other.distances``.
+
+    Positioning errs, in the bearing most of all; where the scan shows the body, it is as near as its nearest return, or
+    as positioning says if that is nearer. Only what the scan does not show may be nearer by the error.
+    """
+    shared, rig = see.shared, see.rig
+    sigma = rig.sensor.position_sigma
+    for t in range(PEERS):
+        if shared["track_id"][t] < 0:
+            continue
+        d = math.sqrt(shared["track_x"][t] ** 2 + shared["track_y"][t] ** 2)
+        surface = d - rig.body.radius_m
+        least = surface - sigma * d
+        if sigma > 0.0:
+            shown = returns_of(see, t, False)
+            if shown < math.inf:
+                least = max(least, min(surface, shown))
+        see.other.distances[t] = least
 
 
 @jit_inner
@@ -281,8 +304,7 @@ def _clear_of_tracks(see: View, way: Way, met: float) -> bool:
         d = math.sqrt(x * x + y * y)
         if d < 1e-6:
             return False
-        surface = d - rig.body.radius_m - rig.sensor.position_sigma * d
-        surface = max(surface, 1e-6)
+        surface = max(see.other.distances[t], 1e-6)
         scale = surface / d
         if not _in_own_half(x * scale, y * scale, surface, way, met, rig):
             return False
