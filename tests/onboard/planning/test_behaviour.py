@@ -7,8 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from helpers import circle, one_robot, place_scenario, run_scenario, wall
-from swarmscope.onboard.deciding.progress import may_leave
+from helpers import circle, place_scenario, run_scenario, wall
 
 ROOM = wall((-4, 4), (4, 4), (4, -4), (-4, -4), (-4, 4))
 
@@ -135,16 +134,3 @@ def test_a_goal_that_nobody_can_reach_in_time_is_left_unreached_safely():
     trace = run_scenario(place_scenario([(-3, 0, 0)], [(3, 0)], [wall((0, -9.9), (0, 9.9))], limit_s=10.0))
     assert not trace.robots["arrived"].any()
     assert not trace.robots["crashed"].any()
-
-
-@pytest.mark.parametrize(("wind", "leaves"), [(1.0, False), (6.2, False), (6.4, True)])
-def test_what_was_seen_of_the_way_is_not_believed_after_a_whole_round(wind, leaves):
-    """A strict following waits for a place closer to the goal than any seen: a wrong bearing had shown one."""
-    rows = one_robot()
-    rows.fill(goal_distance=12.0)
-    see, memory = rows.view, rows.memory
-    see.masked[:] = np.inf  # free for 5 m, up to 7 m from the goal
-    memory["strict"], memory["wind"], memory["closest"] = 1, wind, 7.2
-    assert may_leave(see, memory) == leaves
-    memory["strict"], memory["closest"] = 1, 7.8
-    assert may_leave(see, memory)

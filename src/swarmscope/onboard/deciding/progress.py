@@ -80,15 +80,9 @@ def watch_progress(see: View, memory: Row, stuck_s: float) -> None:
 
 @jit
 def may_leave(see: View, memory: Row) -> bool:
-    """Tell whether a following may end: a strict one when the way is seen free until closer to the goal than ever.
-
-    One that has gone all the way round has seen that there is no such place: what was seen before is not believed.
-    """
+    """Tell whether a following may end: a strict one when the way is seen free until closer to the goal than ever."""
     if memory["strict"] == 0:
         return True
-    if memory["wind"] > TWO_PI:
-        memory["wind"] -= TWO_PI
-        memory["closest"] = see.percept["goal_distance"]
     in_sight = nearest_in_sight(see)
     return bool(in_sight <= 0.0 or in_sight < memory["closest"] - LEAVE_GAIN)
 
