@@ -95,7 +95,7 @@ class NoiseModel(_Strict):
     """Error of the place by odometry after 1 m, along and across, a random walk that grows with the root of the way
     [m/√m]."""
     odometry_turn_deg: Angle = math.degrees(NOISE.odometry_turn_rad)
-    """Error of the heading by odometry, in the same way; the package's planners read the compass instead [°/√m]."""
+    """Error of the heading by odometry, in the same way; it steadies the compass [°/√m]."""
     nan: Fraction = NOISE.nan
     """Share of LiDAR readings that are broken (NaN), drawn anew for every scan."""
     stuck: Fraction = NOISE.stuck
