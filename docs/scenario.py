@@ -72,14 +72,14 @@ one leaves those of the others alone.
   readings (`nan`). Broken readings can be told, and the robot bridges or blocks them; a stuck beam and a blind sector say *free*, and nobody can tell.
   Mutual positioning is a sensor of its own: neighbours in the blind sector are still listed.
 - **Late scans** (`noise.scan_age_s` = T). Each scan is as the LiDAR would have seen it a random time below T before, from where the robot and all others were then; mutual
-  positioning, odometry and compass are of now. The robot does not know how late it is and takes it for a scan of now. The guard's `latency_s` is T ([safety.md](safety.md)). `robot.sensor_delay_s`
+  positioning, odometry and compass are of now. The scan has a stamp: each robot turns it by its own odometry, errors included, into what is seen from where it is now. The guard's `latency_s` is T ([safety.md](safety.md)). `robot.sensor_delay_s`
   is another thing: by it planners keep wider margins; it makes no scan older.
 - **Restarts.** From one tick to the next the robot brakes, stands for `faults.restart_s`, sends and hears nothing, and loses what was on the way to it.
   Then it runs like one that was just switched on: memory of planner, tracks and inbox empty, its clock at 0, its counter at 0, a new boot number ([message.md](message.md)). Its place stays, and who had arrived has arrived.
   While it is off, `trajectory.npz` shows it in the state *yield*, standing still.
 - **Silence.** The radio alone fails: the robot drives on. Packets to it count as `packets_out_of_range`, those that were on the way as `packets_lost`.
-- **Clocks.** `now_s`, which a robot's planner reads, jumps by `faults.clock_jump_s`; time steps stay right. Forward, what is remembered for a time (features, neighbours out of sight) is
-  forgotten; back, it is remembered longer, and waits last longer, both by as much as the clock jumped. On a real robot `Robot` takes jumps out, at the price of one tick of braking.
+- **Clocks.** A robot's clock jumps by `faults.clock_jump_s`; time steps stay right. On board jumps are taken out before anything reads the time (`onboard/perception/clock.py`): a clock that goes back, or five periods forward, in one
+  tick has been set anew, and one period has passed. So a jump of less than that forward, or less than a period back, is the only one that counts. `Robot` brakes for one tick besides.
 
 """
 

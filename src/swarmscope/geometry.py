@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+from typing import TypeAlias
 
 from swarmscope._jit import jit_inline
 
 TWO_PI = 2.0 * math.pi
+Pose: TypeAlias = tuple[float, float, float]
+"""x [m], y [m], yaw [rad]."""
 
 
 @jit_inline
@@ -35,6 +38,21 @@ def positive_angle(angle: float) -> float:
 def angle_from(start: float, angle: float) -> float:
     """Return how far one turns counter-clockwise from ``start`` to ``angle`` [rad], in [0, 2 pi)."""
     return positive_angle(angle - start)
+
+
+@jit_inline
+def then(a: Pose, b: Pose) -> Pose:
+    """Return pose ``b``, given in the frame of ``a``, in the frame that ``a`` is given in."""
+    c, s = math.cos(a[2]), math.sin(a[2])
+    return a[0] + c * b[0] - s * b[1], a[1] + s * b[0] + c * b[1], wrap_angle(a[2] + b[2])
+
+
+@jit_inline
+def seen_from(here: Pose, there: Pose) -> Pose:
+    """Return pose ``there`` in the frame of ``here``."""
+    dx, dy = there[0] - here[0], there[1] - here[1]
+    c, s = math.cos(here[2]), math.sin(here[2])
+    return c * dx + s * dy, c * dy - s * dx, wrap_angle(there[2] - here[2])
 
 
 @jit_inline

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from helpers import DT, beams_of, make_sensor, place_sim, rig_of, world_of
+from swarmscope.onboard.perception.reproject import move_on
+from swarmscope.onboard.view import python_view
 from swarmscope.sim.cells import index_robots
 from swarmscope.sim.sensing import sense
 from swarmscope.sim.state import Noise
@@ -249,3 +251,56 @@ def test_whoever_comes_into_range_or_leaves_it_is_seen_where_he_was():
         sense(sim, tick, 0, 1)
         seen.append((tick % 2, bool(np.isfinite(sim.ranges[0]).any())))
     assert {out for out, there in seen if there} == {0, 1}
+
+
+def driving(noise):
+    """A robot that drives and turns in a ring of 1 m; at each tick where its scan was taken, and where it says."""
+    sim = lonely(noise, 30)
+    sim.robots["goal_x"] += 5.0
+    found = []
+    for tick in range(12):
+        sense(sim, tick, 0, 30)
+        found.append([sim.percepts[name].copy() for name in ("scan_x", "scan_y", "scan_yaw")])
+        sim.robots["x"] += 0.02 * np.cos(sim.robots["yaw"])
+        sim.robots["y"] += 0.02 * np.sin(sim.robots["yaw"])
+        sim.robots["yaw"] += 0.3 * (-1.0) ** np.arange(30)
+    return sim, np.array(found)
+
+
+def test_a_robot_is_told_how_it_has_moved_since_its_scan():
+    _, told = driving(Noise(scan_age_s=0.5))
+    assert (told[0] == 0.0).all()  # it stood
+    late = told[4:]
+    assert np.abs(late[:, 2]).max() == pytest.approx(0.3 * 2.5, rel=0.05)
+    assert (np.sign(late[:, 2]) == -((-1.0) ** np.arange(30))).all()  # it has turned on since
+    assert late[:, 0].min() >= -0.05 and late[:, 0].max() <= 1e-9
+    _, wrong = driving(Noise(scan_age_s=0.5, odometry_scale=0.05))
+    assert 0.01 < np.abs(wrong[4:, 2] / late[:, 2] - 1.0).max() < 0.2  # by its own wheels
+    _, never = driving(Noise())
+    assert (never == 0.0).all()
+
+
+@pytest.mark.parametrize("age", [0.1, 0.4])
+def test_a_late_scan_that_is_moved_on_shows_what_is_seen_from_here(age):
+    trees = [Circle(center=(1.0, 0.4), radius=0.3), Circle(center=(-0.6, 1.2), radius=0.4)]
+    seats = []
+    for oldest in (age, 0.0):
+        sim, swarm = place_sim([(0.0, 0.0, 0.3)], [(5.0, 0.0)], world_of(*trees), noise=Noise(scan_age_s=oldest))
+        index_robots(sim)
+        for tick in range(8):
+            sense(sim, tick, 0, 1)
+            before = sim.ranges[0].copy()
+            move_on(python_view(swarm, 0))
+            seats.append((before, sim.ranges[0].copy()))
+            sim.robots["x"] += 0.03 * np.cos(sim.robots["yaw"])
+            sim.robots["y"] += 0.03 * np.sin(sim.robots["yaw"])
+            sim.robots["yaw"] += 0.25
+    off, moved = [], []
+    for (raw, late), (now, same) in zip(seats[2:8], seats[10:], strict=True):
+        assert now.tobytes() == same.tobytes()
+        near = np.isfinite(now) & np.isfinite(raw) & np.isfinite(late)
+        off.append(np.median(np.abs(raw[near] - now[near])))
+        moved.append(np.median(np.abs(late[near] - now[near])))
+        assert near.sum() > 5
+    assert max(moved) < 0.005
+    assert max(off) > 0.02

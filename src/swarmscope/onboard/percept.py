@@ -27,7 +27,7 @@ NEVER_S = -1e9
 
 PERCEPT = np.dtype(
     [
-        ("now_s", np.float64),  # the robot's own clock [s]
+        ("now_s", np.float64),  # the robot's own clock, after ``perceive`` without its jumps [s]
         ("dt_s", np.float64),  # time until the next tick [s]
         ("goal_bearing", np.float64),  # of the goal, body frame [rad]
         ("goal_distance", np.float64),  # [m]
@@ -35,6 +35,9 @@ PERCEPT = np.dtype(
         ("odom_x", np.float64),  # motion since the last tick, in the body frame of the last tick [m]
         ("odom_y", np.float64),
         ("odom_yaw", np.float64),  # [rad]
+        ("scan_x", np.float64),  # where the body was when the scan was taken, by odometry, body frame of now [m]
+        ("scan_y", np.float64),
+        ("scan_yaw", np.float64),  # [rad]
         ("compass", np.float64),  # own heading, compass frame [rad]
         ("id", np.int64),  # own radio address
         ("boot", np.int64),  # drawn anew at every start, 0 to 65535
@@ -126,6 +129,8 @@ SHARED = np.dtype(
         ("dropped_bad", np.int64),  # torn, corrupt or foreign packets
         ("dropped_stale", np.int64),  # old, replayed or unasked-for packets
         ("started", np.uint8),
+        ("clock_s", np.float64),  # what the clock said at the last tick
+        ("ahead_s", np.float64),  # by how much it has jumped, forward positive
         ("compass", np.float64),  # of the last tick
         ("view_first", np.int64),  # beams of a limited field of view between which something is known
         ("view_last", np.int64),

@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from swarmscope.geometry import Pose
 from swarmscope.onboard.body import Body
 from swarmscope.onboard.data_sheets import (
     BOOTS,
@@ -37,17 +38,16 @@ from swarmscope.onboard.edge import (
     one_number,
 )
 from swarmscope.onboard.lidar import Lidar, check_lidar
+from swarmscope.onboard.perception.clock import JUMP_PERIODS
 from swarmscope.onboard.planners import Planner
 from swarmscope.onboard.reasons import STATE_NAMES
 from swarmscope.onboard.rows import Rows
 from swarmscope.onboard.scans import STALE_PERIODS, Scans
-from swarmscope.onboard.trail import Pose, Trail, then
+from swarmscope.onboard.trail import Trail, then
 from swarmscope.onboard.warm import WarmUp, warm_up
 
 __all__ = ["Command", "Lidar", "Robot", "Seen", "WarmUp"]
 
-JUMP_PERIODS = 5.0
-"""A tick that comes later than this is a jump of the clock, or a robot that was asleep."""
 JITTER = 1.01
 """A tick that comes at most this much later than it should is on time."""
 LATEST_S = 1e11
@@ -219,7 +219,7 @@ class Robot:
             self._ahead_s += dt - self._period_s
             raise Unusable("clock", f"the clock went from {last:.6g} to {now:.6g} s")
         late = dt > JITTER * self._period_s
-        self.rows.fill(now_s=now - self._ahead_s, dt_s=dt if late else self._period_s)
+        self.rows.set_time(now - self._ahead_s, dt if late else self._period_s)
         return now, dt
 
     def _fill(self, goal: Any, heading: Any, speed: Any) -> None:

@@ -59,6 +59,11 @@ class Rows:
         for name, value in values.items():
             self._given[name][0] = value
 
+    def set_time(self, now_s: float, dt_s: float) -> None:
+        """Set a time that has passed since the last call of the planner, however long ago that was."""
+        self.fill(now_s=now_s, dt_s=dt_s)
+        self.shared["clock_s"], self.shared["ahead_s"] = now_s - dt_s, 0.0
+
     def see(self, neighbours: list[Any]) -> None:
         """Set the neighbours (``Seen``), at most MAX_NEIGHBOURS, nearest first."""
         given = self._given

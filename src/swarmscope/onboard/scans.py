@@ -7,18 +7,17 @@ from typing import Any
 
 import numpy as np
 
+from swarmscope.geometry import Pose
 from swarmscope.onboard.edge import Unusable, number, readings, short
 from swarmscope.onboard.lidar import Layout, Lidar, grid_of, lay_out, layout_of, same_rays
-from swarmscope.onboard.perception.reproject import Grid, Seat, reproject, settle
-from swarmscope.onboard.trail import Pose, Trail, then
+from swarmscope.onboard.perception.reproject import NEAR_M, NEAR_STEPS, Grid, Seat, reproject, settle
+from swarmscope.onboard.trail import Trail, then
 
 MOST_READINGS = 8192
 STALE_PERIODS = 3.05
 """Older scans are not used: three periods, and a little for rounding."""
 AHEAD_PERIODS = 0.5
 """A scan may be stamped this much later than the tick."""
-NEAR_M, NEAR_STEPS = 0.002, 0.25
-"""A scan taken this close by, turned by this share of an increment, is used as it is."""
 
 
 class Scans:

@@ -8,11 +8,13 @@ from __future__ import annotations
 from swarmscope._jit import jit, jit_paste
 from swarmscope.onboard.control.guard import guard
 from swarmscope.onboard.perception.bearings import steady
+from swarmscope.onboard.perception.clock import keep_time
 from swarmscope.onboard.perception.features import align_features, extrema
 from swarmscope.onboard.perception.filters import filter_padded, prepare_scan
 from swarmscope.onboard.perception.frames import keep_frame, look_back
 from swarmscope.onboard.perception.lost import keep_lost
 from swarmscope.onboard.perception.mend import mend
+from swarmscope.onboard.perception.reproject import move_on
 from swarmscope.onboard.perception.safety import safe_directions
 from swarmscope.onboard.rig import AHEAD, PRINTED
 from swarmscope.onboard.sharing.inbox import answer_all, read_inbox
@@ -28,10 +30,12 @@ def perceive(see: View, still_s: float) -> None:
     """
     see.out["n_out"] = 0
     see.out["fused"] = 0
+    keep_time(see.percept, see.shared)
     steady(see.percept, see.shared)
     dx, dy = update_odometry(see.percept, see.shared)
     read_inbox(see)
     update_tracks(see.percept, see.shared, see.rig, dx, dy)
+    move_on(see)
     if see.rig.sensor.field > 0:
         look_back(see)
     mend(see.scan, see.rig)

@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from collections import deque
 
+from swarmscope import geometry
+from swarmscope.geometry import Pose
 from swarmscope.onboard.edge import angle
 
 KEPT = 64
 """Ticks that are remembered at most."""
 
-Pose = tuple[float, float, float]
-"""x [m], y [m], yaw [rad]."""
-
-
-def then(a: Pose, b: Pose) -> Pose:
-    """Return pose ``b``, given in the frame of ``a``, in the frame that ``a`` is given in."""
-    c, s = math.cos(a[2]), math.sin(a[2])
-    return a[0] + c * b[0] - s * b[1], a[1] + s * b[0] + c * b[1], angle(a[2] + b[2])
+then = getattr(geometry.then, "py_func", geometry.then)
+seen_from = getattr(geometry.seen_from, "py_func", geometry.seen_from)
 
 
 class Trail:
@@ -53,18 +48,11 @@ class Trail:
             return 0.0, 0.0, 0.0
         if when_s < ticks[0][0]:
             known = self._first and ticks[0][0] - when_s <= self._before_start_s
-            return _seen_from(ticks[-1][1], ticks[0][1]) if known else None
+            return seen_from(ticks[-1][1], ticks[0][1]) if known else None
         k = len(ticks) - 2
         while ticks[k][0] > when_s:
             k -= 1
         (t0, a), (t1, b) = ticks[k], ticks[k + 1]
         part = (when_s - t0) / (t1 - t0)
         old = a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1]), a[2] + part * angle(b[2] - a[2])
-        return _seen_from(ticks[-1][1], old)
-
-
-def _seen_from(here: Pose, there: Pose) -> Pose:
-    """Return pose ``there`` in the frame of ``here``."""
-    dx, dy = there[0] - here[0], there[1] - here[1]
-    c, s = math.cos(here[2]), math.sin(here[2])
-    return c * dx + s * dy, c * dy - s * dx, angle(there[2] - here[2])
+        return seen_from(ticks[-1][1], old)

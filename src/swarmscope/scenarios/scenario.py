@@ -95,7 +95,7 @@ class NoiseModel(_Strict):
     """Error of the place by odometry after 1 m, along and across, a random walk that grows with the root of the way
     [m/√m]."""
     odometry_turn_deg: Angle = math.degrees(NOISE.odometry_turn_rad)
-    """Error of the heading by odometry, in the same way; the package's planners read the compass instead [°/√m]."""
+    """Error of the heading by odometry, in the same way; it steadies the compass [°/√m]."""
     nan: Fraction = NOISE.nan
     """Share of LiDAR readings that are broken (NaN), drawn anew for every scan."""
     stuck: Fraction = NOISE.stuck
@@ -123,7 +123,7 @@ class FaultsModel(_Strict):
     clock_jumps_per_h: Rate = FAULTS.clock_jumps_per_h
     """How often a robot's own clock jumps, to and fro alike often [1/h]."""
     clock_jump_s: Duration = FAULTS.clock_jump_s
-    """How far it jumps; by that much longer a robot may wait, for what its planner waits for, after a jump back [s]."""
+    """How far it jumps; robots take out what cannot be time that has passed [s]."""
 
 
 class RadioModel(_Strict):

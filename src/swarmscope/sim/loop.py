@@ -91,10 +91,10 @@ class Trace:
 
 
 @jit
-def record_tick(sim: Sim, safe: np.ndarray, records: Records, row: int, with_scans: bool) -> None:
-    """Write this tick into row ``row`` of the records."""
+def record_tick(sim: Sim, safe: np.ndarray, records: Records, row: int, with_scans: bool, tick: int) -> None:
+    """Write tick ``tick`` into row ``row`` of the records."""
     beams = sim.ranges.shape[1]
-    _log_choices(sim)
+    _log_choices(sim, tick)
     for i in range(sim.robots.size):
         robot, decision = sim.robots[i], sim.decisions[i]
         records.x[row, i], records.y[row, i], records.yaw[row, i] = robot["x"], robot["y"], robot["yaw"]
@@ -116,16 +116,16 @@ def record_tick(sim: Sim, safe: np.ndarray, records: Records, row: int, with_sca
 
 
 @jit_inner
-def _log_choices(sim: Sim) -> None:
+def _log_choices(sim: Sim, tick: int) -> None:
     """Keep the choices of a side made in this tick."""
     for i in range(sim.robots.size):
-        robot, percept, decision = sim.robots[i], sim.percepts[i], sim.decisions[i]
+        robot, decision = sim.robots[i], sim.decisions[i]
         at = sim.choices_n[0]
         if not decision["fused"] or robot["crashed"] or at >= CHOICES:
             continue
         choice = sim.choices[at]
         sim.choices_n[0] = at + 1
-        choice["tick"], choice["robot"] = int((percept["now_s"] - robot["clock_s"]) / sim.clock.dt + 0.5), i
+        choice["tick"], choice["robot"] = tick, i
         choice["x"], choice["y"] = robot["x"], robot["y"]
         choice["target"] = math.atan2(robot["goal_y"] - robot["y"], robot["goal_x"] - robot["x"])
         choice["p_self"], choice["p_left"] = decision["p_self"], decision["p_left"]
@@ -142,7 +142,7 @@ def world_phase(
     sim: Sim, safe: np.ndarray, records: Records, row: int, with_scans: bool, tick: int
 ) -> bool:
     """Record tick ``tick``, then exchange, move, judge and sense the next; return whether everybody is done."""
-    record_tick(sim, safe, records, row, with_scans)
+    record_tick(sim, safe, records, row, with_scans, tick)
     exchange(sim, tick)
     move(sim, tick, 0, sim.robots.size)
     return settle(sim, tick) or _sense_next(sim, tick)
@@ -209,7 +209,7 @@ def run(setting: Setting, progress: Callable[[float, int], None] | None = None) 
         if pool.size == 1:
             done = world_phase(sim, swarm.safe, chunks[-1], row, beams > 0, tick)
         else:
-            record_tick(sim, swarm.safe, chunks[-1], row, beams > 0)
+            record_tick(sim, swarm.safe, chunks[-1], row, beams > 0, tick)
             exchange(sim, tick)
             pool.each(partial(move, sim, tick))
             done = settle(sim, tick)

@@ -209,6 +209,8 @@ class Sim(NamedTuple):
     path: np.ndarray
     past: np.ndarray
     """(K, N, 3): x, y, yaw of all robots at the last K ticks, tick k in row k mod K; K is 0 where no scan is late."""
+    steps: np.ndarray
+    """(K, N, 3): motion up to these ticks by the robots' own wheels, in the frame of the tick before."""
     cell_of: np.ndarray
     cell_start: np.ndarray
     cell_items: np.ndarray
@@ -268,6 +270,7 @@ def new_sim(
         swarm.percepts["boot"] = [boot_number(clock.seed, i, 0) for i in range(n)]
     columns = max(1, int(np.ceil((bounds[2] - bounds[0]) / CELL_M)))
     rows = max(1, int(np.ceil((bounds[3] - bounds[1]) / CELL_M)))
+    past = _new_past(np.asarray(starts, float), noise.scan_age_s / clock.dt)
     sim = Sim(
         world=world,
         beams=beams,
@@ -286,7 +289,8 @@ def new_sim(
         queue_from=np.zeros((n, QUEUE), np.int64),
         queue_data=np.zeros((n, QUEUE, MAX_PACKET_BYTES), np.uint8),
         path=np.zeros((n, clock.substeps + 1, 2)),
-        past=_new_past(np.asarray(starts, float), noise.scan_age_s / clock.dt),
+        past=past,
+        steps=np.zeros_like(past),
         cell_of=np.zeros(n, np.int64),
         cell_start=np.zeros(columns * rows + 1, np.int64),
         cell_items=np.zeros(n, np.int64),

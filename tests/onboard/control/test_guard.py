@@ -185,6 +185,38 @@ def test_a_neighbour_is_kept_off_even_when_its_returns_are_missing():
     assert guarded(np.full(360, np.inf, np.float32), 0.0, 0.5, 0.0, rows=rows)[0] < 0.2
 
 
+def passing(shown, position_sigma, others=()):
+    """The speed that is let through past a robot that stands 0.39 m away, 80 degrees to the left, 9 cm between both."""
+    rig = rig_of(sensor=make_sensor(position_sigma=position_sigma))
+    rows = one_robot(rig)
+    x, y = 0.39 * math.cos(math.radians(80.0)), 0.39 * math.sin(math.radians(80.0))
+    rows.see([seen(3, x, y)])
+    update_odometry(rows.percept, rows.shared)
+    update_tracks(rows.percept, rows.shared, rig, 0.0, 0.0)
+    scan = scan_at(circles_world([(x, y, 0.15)] * shown + list(others)), rig)
+    return guarded(scan, 0.0, 0.2, 0.0, rows=rows)[0]
+
+
+def test_errors_of_positioning_count_only_where_the_scan_does_not_show_the_neighbour():
+    """With 10 degrees of bearing error robots that stood side by side never parted."""
+    exact = passing(True, 0.0)
+    assert exact >= 0.1
+    assert passing(True, math.radians(10.0)) == exact
+    assert passing(False, math.radians(10.0)) < 0.03 < passing(False, 0.0)
+
+
+def test_a_neighbour_that_is_nearer_than_positioning_says_is_as_near_as_the_scan_says():
+    sigma = math.radians(10.0)
+    rig = rig_of(sensor=make_sensor(position_sigma=sigma))
+    speeds = []
+    for true in (0.6, 0.5, 0.42):
+        rows = one_robot(rig)
+        rows.see([seen(3, 0.6, 0.0)])
+        update_tracks(rows.percept, rows.shared, rig, 0.0, 0.0)
+        speeds.append(guarded(scan_at(circles_world([(true, 0.0, 0.15)]), rig), 0.0, 0.5, 0.0, rows=rows)[0])
+    assert speeds == sorted(speeds, reverse=True) and speeds[0] > speeds[2] > 0.0
+
+
 BODIES = {
     "published": Body(),
     "fast": Body(v_max_mps=1.5, a_max_mps2=2.0),

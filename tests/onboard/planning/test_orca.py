@@ -130,6 +130,14 @@ def test_a_crowded_scan_is_made_coarser_until_it_fits():
     assert robot.said("v") < 0.5
 
 
+def test_a_scan_of_nothing_but_single_returns_fits_too():
+    """Range errors tear returns apart; no coarser error joins them."""
+    ranges = np.full(360, np.inf, np.float32)
+    ranges[::3] = np.where(np.arange(120) % 2, 0.6, 1.4)
+    robot = robot_at(ranges)
+    assert 0 < len(lines_of(robot)) <= MAX_LINES
+
+
 def test_the_same_bytes_every_time_with_any_number_of_threads():
     starts = [(-3, 0.2, 0), (3, 0, math.pi), (0, -3, 1.57)]
     goals = [(3, 0.2), (-3, 0), (0, 3)]

@@ -31,7 +31,7 @@ from swarmscope.onboard.reasons import (
     R_HELD_UNSEEN,
 )
 from swarmscope.onboard.rig import Rig
-from swarmscope.onboard.sharing.tracks import near_track
+from swarmscope.onboard.sharing.tracks import near_track, returns_of
 from swarmscope.onboard.view import View
 
 STEPS = 4
@@ -82,7 +82,7 @@ def guard(see: View) -> bool:
     """Lower the speed that was decided until it is safe; return whether it had to.
 
     A robot that it lets stand says why. What is no number, time that does not pass, and a LiDAR that has gone blind
-    brake. ``see.edges`` is scratch.
+    brake. ``see.edges`` and ``see.other`` are scratch.
     """
     percept, rig, out = see.percept, see.rig, see.out
     asked, w = out["v"], out["w"]
@@ -124,6 +124,7 @@ def _allowed(see: View, asked: float, w: float) -> tuple[float, float, int]:
     if see.shared["losses"] > SOME_LOSSES:
         wanted *= (MOST_LOSSES - see.shared["losses"]) / (MOST_LOSSES - SOME_LOSSES)
     near = _near(see, max(speed, min(wanted, speed + body.a_max_mps2 * dt)))
+    _measure_gaps(see)
     why = FREE
     for fraction in FRACTIONS:
         v = wanted * fraction
@@ -147,6 +148,28 @@ def _look_round(see: View, v: float, w: float, why: int) -> tuple[float, float, 
         return v, w, why
     turn = min(see.rig.body.w_max_radps, LOOK_SHARE * field / see.percept["dt_s"])
     return 0.0, turn if shared["unseen_left"] else -turn, R_HELD_UNSEEN
+
+
+@jit_inner
+def _measure_gaps(see: View) -> None:
+    """Write how far the body of each track's neighbour is at least [m] into ``see.other.distances``.
+
+    Positioning errs, in the bearing most of all; where the scan shows the body, it is as near as its nearest return, or
+    as positioning says if that is nearer. Only what the scan does not show may be nearer by the error.
+    """
+    shared, rig = see.shared, see.rig
+    sigma = rig.sensor.position_sigma
+    for t in range(PEERS):
+        if shared["track_id"][t] < 0:
+            continue
+        d = math.sqrt(shared["track_x"][t] ** 2 + shared["track_y"][t] ** 2)
+        surface = d - rig.body.radius_m
+        least = surface - sigma * d
+        if sigma > 0.0:
+            shown = returns_of(see, t, False)
+            if shown < math.inf:
+                least = max(least, min(surface, shown))
+        see.other.distances[t] = least
 
 
 @jit_inner
@@ -408,8 +431,7 @@ def _clear_of_tracks(see: View, way: Way, met: float) -> bool:
         d = math.sqrt(x * x + y * y)
         if d < 1e-6:
             return False
-        surface = d - rig.body.radius_m - rig.sensor.position_sigma * d
-        surface = max(surface, 1e-6)
+        surface = max(see.other.distances[t], 1e-6)
         scale = surface / d
         if not _in_own_half(x * scale, y * scale, surface, way, met, rig):
             return False

@@ -15,9 +15,14 @@ import numpy as np
 from swarmscope._jit import jit, jit_inner
 from swarmscope.geometry import ray_segment, wrap_angle
 from swarmscope.onboard.lidar import Rays
+from swarmscope.onboard.view import View
 
 ON_BORDER = math.pi - 0.01
 """Seen under a larger angle than this [rad], a piece of border passes through where we are."""
+
+
+NEAR_M, NEAR_STEPS = 0.002, 0.25
+"""A scan taken this close by [m], turned by this share of an increment, is used as it is."""
 
 
 class Seat(NamedTuple):
@@ -50,6 +55,21 @@ class End(NamedTuple):
     x: float
     y: float
     bearing: float
+
+
+@jit
+def move_on(see: View) -> None:
+    """Make ``see.scan`` of a moment before what is seen from where the robot is now; ``see.filtered`` is scratch."""
+    percept, sensor = see.percept, see.rig.sensor
+    x, y, yaw = percept["scan_x"], percept["scan_y"], percept["scan_yaw"]
+    if math.hypot(x, y) <= NEAR_M and abs(yaw) <= NEAR_STEPS * sensor.increment:
+        return
+    for n in range(sensor.beams):  # out of a limited view nothing was measured
+        measured = sensor.field == 0 or sensor.first <= n < sensor.first + sensor.field
+        see.filtered[n] = see.scan[n] if measured else math.inf
+    rays = Rays(sensor.angle_min, sensor.increment, sensor.wraps, sensor.range_max)
+    seat = Seat(x, y, yaw, x, y, see.rig.body.radius_m + see.rig.guarding.clearance_m)
+    reproject(see.filtered, rays, seat, Grid(rays, see.rig.cos, see.rig.sin), see.scan)
 
 
 @jit

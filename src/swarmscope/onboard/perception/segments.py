@@ -34,6 +34,7 @@ def write_segments(see: View, memory: Row, reach: float, closed: float) -> None:
 
     Neighbouring returns are joined when they are nearer than ``closed`` [m], so that what is too narrow is closed;
     then every chain is divided where it is farthest from its chord (Douglas and Peucker) until ``LINE_ERROR`` holds.
+    Where that makes more than ``MAX_LINES``, the error is larger; with more chains than that, wider gaps are closed.
     """
     sensor, hits = see.rig.sensor, see.edges
     count = 0
@@ -50,10 +51,11 @@ def write_segments(see: View, memory: Row, reach: float, closed: float) -> None:
             widest, last = gap, k
     ring = Ring(count, (last + 1) % count)
     error = LINE_ERROR
-    while True:
-        if _divide(see, memory, ring, closed, error):
-            break
-        error *= 1.5
+    while not _divide(see, memory, ring, closed, error):
+        if _chains(see, ring, closed) > MAX_LINES:  # each takes a segment, however coarse
+            closed *= 1.5
+        else:
+            error *= 1.5
     _sort(memory["lines"], memory["lines_n"])
 
 
@@ -80,6 +82,15 @@ def _gap(see: View, a: int, b: int) -> float:
     dx = work[a] * rig.cos[a] - work[b] * rig.cos[b]
     dy = work[a] * rig.sin[a] - work[b] * rig.sin[b]
     return math.sqrt(dx * dx + dy * dy)
+
+
+@jit_inner
+def _chains(see: View, ring: Ring, closed: float) -> int:
+    """Return how many chains the returns make."""
+    hits, count, chains = see.edges, ring.returns, 1
+    for k in range(1, count):
+        chains += _gap(see, hits[(ring.first + k - 1) % count], hits[(ring.first + k) % count]) > closed
+    return chains
 
 
 @jit_inner

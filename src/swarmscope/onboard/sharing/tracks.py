@@ -132,7 +132,7 @@ def mask_moving_neighbours(see: View, still_s: float) -> None:
         see.masked[n] = see.scan[n]
     for t in range(PEERS):
         if moves(see.percept, see.shared, t, still_s):
-            _hide(see, t)
+            returns_of(see, t, True)
 
 
 @jit_inline
@@ -141,9 +141,12 @@ def moves(percept: Row, shared: Row, t: int, still_s: float) -> bool:
     return bool(shared["track_id"][t] >= 0 and percept["now_s"] - shared["track_moved_s"][t] < still_s)
 
 
-@jit_inner
-def _hide(see: View, t: int) -> None:
-    """Take the returns that may belong to the neighbour of track ``t`` out of the masked scan."""
+@jit
+def returns_of(see: View, t: int, hide: bool) -> float:
+    """Return the smallest range [m] among the returns that may belong to the neighbour of track ``t``, inf for none.
+
+    ``hide`` takes them out of the masked scan.
+    """
     percept, shared, rig, ranges = see.percept, see.shared, see.rig, see.scan
     sensor = rig.sensor
     c, s = math.cos(percept["compass"]), math.sin(percept["compass"])
@@ -151,8 +154,9 @@ def _hide(see: View, t: int) -> None:
     y = c * shared["track_y"][t] - s * shared["track_x"][t]
     d = math.sqrt(x * x + y * y)
     reach = neighbour_reach(d, rig)
+    nearest = math.inf
     if d - reach > sensor.range_max:
-        return
+        return nearest
     half_angle = math.asin(reach / d) if d > reach else math.pi
     spread = int(math.ceil(half_angle / sensor.increment))
     centre = int(math.floor((math.atan2(y, x) - sensor.angle_min) / sensor.increment + 0.5))
@@ -168,7 +172,10 @@ def _hide(see: View, t: int) -> None:
             continue
         ex, ey = ranges[n] * rig.cos[n] - x, ranges[n] * rig.sin[n] - y
         if ex * ex + ey * ey <= reach * reach:
-            see.masked[n] = np.inf
+            nearest = min(nearest, float(ranges[n]))
+            if hide:
+                see.masked[n] = np.inf
+    return nearest
 
 
 @jit_inline
