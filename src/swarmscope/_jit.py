@@ -188,5 +188,9 @@ def jit_alloc(function: F) -> F:
 
 
 def jit_paste(function: F) -> F:
-    """Paste ``function`` into its callers before they are typed; for what returns views of arrays of records."""
+    """Paste ``function`` into its callers before they are typed.
+
+    For what returns views of arrays of records, and for what few call with so many arrays that the handing over takes
+    time.
+    """
     return jit_for(function, options=LEAN | {"inline": "always"})

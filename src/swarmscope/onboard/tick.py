@@ -22,7 +22,7 @@ from swarmscope.onboard.sharing.tracks import mask_moving_neighbours, update_odo
 from swarmscope.onboard.view import Swarm, View, view_of
 
 
-@jit
+@jit_paste
 def perceive(see: View, still_s: float) -> None:
     """Take in packets, poses and scan: fill ``see.masked`` and ``see.safe``.
 
