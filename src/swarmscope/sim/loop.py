@@ -167,8 +167,16 @@ def _sense_next(sim: Sim, tick: int) -> bool:
     return False
 
 
-def run(setting: Setting, progress: Callable[[float, int], None] | None = None) -> Trace:
+Between = Callable[[Sim, int], bool]
+"""``(sim, tick)``, called when everybody has decided and nothing has been sent or driven yet; True: the last tick."""
+
+
+def run(
+    setting: Setting, progress: Callable[[float, int], None] | None = None, between: Between | None = None
+) -> Trace:
     """Run to the end; ``progress(simulated seconds, robots done)`` is called every now and then.
+
+    ``between`` looks at every tick, may throw packets at robots (`radio.throw`), and may end the run with it.
 
     The result does not depend on ``threads``: every kernel writes only its own robots' rows, random numbers
     are keyed, and what robots do to each other (radio, contacts) happens in the order of the robots.
@@ -206,6 +214,7 @@ def run(setting: Setting, progress: Callable[[float, int], None] | None = None) 
             pool.each(step_all)
         for rows, blank in forgotten:
             forget(sim, tick, rows, blank)
+        last = between is not None and between(sim, tick)
         if pool.size == 1:
             done = world_phase(sim, swarm.safe, chunks[-1], row, beams > 0, tick)
         else:
@@ -215,6 +224,7 @@ def run(setting: Setting, progress: Callable[[float, int], None] | None = None) 
             done = settle(sim, tick)
             if not done:
                 pool.each(partial(sense, sim, tick + 1))
+        done = done or last
         tick += 1
         if tick == 1:
             begun = time.perf_counter()  # the first tick loads, or compiles, the kernels
