@@ -199,8 +199,8 @@ def run(
     step_all(0, 0)  # loads the kernels, so that no step's time contains that
     begun = time.perf_counter()
     pool.each(lambda a, b: sense(sim, 0, a, b))
-    tick, done = 0, False
-    while tick < ticks and not done:
+    tick, done, last = 0, False, False
+    while tick < ticks and not (done or last):
         row = tick % CHUNK
         if row == 0:
             chunks.append(new_records(min(CHUNK, ticks - tick), n, beams))
@@ -224,7 +224,6 @@ def run(
             done = settle(sim, tick)
             if not done:
                 pool.each(partial(sense, sim, tick + 1))
-        done = done or last
         tick += 1
         if tick == 1:
             begun = time.perf_counter()  # the first tick loads, or compiles, the kernels
