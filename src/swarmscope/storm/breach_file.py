@@ -18,9 +18,9 @@ from swarmscope.storm.watch import Breach
 FIELDS = ("seed", "per_tick", "kinds")
 
 
-def as_text(case: Case, breach: Breach, about: Mapping[str, Any]) -> str:
+def as_text(case: Case, breach: Breach, drawn_as: str) -> str:
     """Return a breach as YAML: a scenario that ``swarmscope run`` takes, or with an adversary one inside a storm."""
-    said = "".join(f"# {line}\n" for line in (breach.text, *(f"{key}: {value}" for key, value in about.items())))
+    said = f"# {breach.kind} in tick {breach.tick}: {breach.text}\n# Drawn as {drawn_as} (seed:number)\n"
     if case.forger is None:
         head = "# Replay: swarmscope run FILE, or swarmscope storm --replay FILE\n"
         return head + said + _dump(case.values)

@@ -30,6 +30,7 @@ from swarmscope.storm.ranges import (
     LIMIT_S,
     NO_CLEARANCE,
     NOISE,
+    OPEN,
     RADIO,
     REPEATED,
     ROBOTS,
@@ -73,17 +74,20 @@ class Draw:
     """Draws before this one that were no possible runs, by the key that says so."""
 
 
-def draw(seed: int, index: int, planners: Sequence[str]) -> Draw | dict[str, int]:
+def draw(seed: int, index: int, planners: Sequence[str], covered: bool = False) -> Draw | dict[str, int]:
     """Return run ``index`` of the storm ``seed``; what was refused where nothing possible was drawn in `TRIES`.
 
     Everything is drawn from ``np.random.default_rng([seed, index])``, in the order of this function; a draw that is
-    refused is followed by the next one of the same stream.
+    refused is followed by the next one of the same stream. What storms are known to break is drawn, and then left out
+    if only what is ``covered`` is wanted.
     """
     rng = np.random.default_rng([seed, index])
     refused: dict[str, int] = {}
     for _ in range(TRIES):
         where = PLACES[int(rng.integers(len(PLACES)))]
         values, forger, again = _draw_once(rng, where, planners)
+        if covered:
+            _leave_out(values)
         try:
             _check(values, where, rng)
         except (ConfigError, UnsolvableWorldError) as error:
@@ -125,6 +129,12 @@ def _draw_once(
         values["map"] = {"file": OFFICE, "min_distance_m": number(rng, Span(2.0, 8.0))}
         values["robots"] = min(values["robots"], 12)
     return values, forger, again
+
+
+def _leave_out(values: dict[str, Any]) -> None:
+    """Give the keys in `OPEN` their defaults."""
+    for group, _, key in (name.partition(".") for name in OPEN):
+        values.get(group, {}).pop(key, None)
 
 
 def _draw_task(rng: np.random.Generator) -> dict[str, Any]:

@@ -19,7 +19,7 @@ from swarmscope.scenarios.places import make_setup
 from swarmscope.scenarios.read import parse_scenario
 from swarmscope.scenarios.to_kernels import make_setting
 from swarmscope.sim.loop import Trace, run
-from swarmscope.storm.draw import Case, draw
+from swarmscope.storm.draw import Case, Draw, draw
 from swarmscope.storm.forger import Attack
 from swarmscope.storm.watch import Breach, Watch, reasons_of
 from swarmscope.tasks import task_file, task_names
@@ -82,10 +82,25 @@ def code_of(planners: Sequence[str]) -> str:
     return state_of(union_of([Path(__file__), *files]))[:16]
 
 
-def make_job(seed: int, index: int, planners: Sequence[str]) -> str:
+class Storm(NamedTuple):
+    """Which runs there are: a number stands for one of them."""
+
+    seed: int
+    planners: Sequence[str]
+    covered: bool = False
+    """Leave out what storms are known to break."""
+
+
+def make_job(storm: Storm, index: int) -> str:
     """Return run ``index`` of a storm as text."""
-    name = f"{seed}:{index}"
-    return json.dumps({"key": name, "world": name, "seed": seed, "number": index, "planners": list(planners)})
+    name = f"{storm.seed}:{index}"
+    return json.dumps({"key": name, "world": name, "number": index, "storm": storm})
+
+
+def draw_job(asked: Mapping[str, Any]) -> Draw | dict[str, int]:
+    """Draw the run of a job."""
+    storm = Storm(*asked["storm"])
+    return draw(storm.seed, asked["number"], storm.planners, storm.covered)
 
 
 def play_job(job: str) -> str:
@@ -93,7 +108,7 @@ def play_job(job: str) -> str:
     asked = json.loads(job)
     begun = time.perf_counter()
     answer: dict[str, Any] = {"key": asked["key"], "number": asked["number"]}
-    drawn = draw(asked["seed"], asked["number"], asked["planners"])
+    drawn = draw_job(asked)
     if isinstance(drawn, dict):
         return json.dumps(answer | {"refused": drawn})
     values = drawn.case.values

@@ -1,7 +1,7 @@
 """Which ranges a storm draws from: the one place where they stand.
 
 Of what docs/safety.md says the guard cannot know, two keys stay out: ``noise.blind_deg`` (a blind sector of 60° touches
-things in nearly every run) and ``noise.scan_age_s`` (turning between scan and decision is not covered; contacts at 0.2).
+things in nearly every run) and ``noise.scan_age_s`` (turning between scan and decision is not covered).
 """
 
 from __future__ import annotations
@@ -118,3 +118,6 @@ STOOD_S: Final = 60.0
 """A run ends when nobody has driven for so long: it would go on like that."""
 TRIES: Final = 400
 """Draws before a number is given up."""
+
+OPEN: Final = ("lidar.fov_deg", "guard.clearance_m", "noise.nan")
+"""Keys that storms have found to break the guard (docs/storms.md): ``--covered`` leaves them at their defaults."""

@@ -13,7 +13,7 @@ from swarmscope.storm.forger import Forger
 from swarmscope.storm.play import watched
 from swarmscope.storm.watch import Breach
 
-MOST_RUNS = 400
+MOST_RUNS = 1000
 GROUPS = ("noise", "faults", "radio")
 ROUNDED = ("robot", "lidar", "guard", "noise", "faults", "radio")
 DIGITS = (1, 2, 3)
@@ -41,7 +41,7 @@ def shrink(case: Case, kind: str, budget: int = MOST_RUNS, play: Kind = breach_o
     search.cut()
     search.tries(_with(search.case, written_place))
     search.cut()
-    steps = (_without_forger, _without_keys, _fewer_robots, _fewer_obstacles, _plainer_forger, _rounder)
+    steps = (_without_forger, _fewer_robots, _fewer_obstacles, _fewer_cells, _without_keys, _plainer_forger, _rounder)
     while search.left > 0:
         before = search.best
         for step in steps:
@@ -149,6 +149,21 @@ def _fewer_obstacles(case: Case) -> Iterator[Case]:
     for kept in _parts(range(len(obstacles))):
         world = place["world"] | {"obstacles": [obstacles[k] for k in kept]}
         yield Case(case.values | {"place": place | {"world": world}}, case.forger)
+
+
+def _fewer_cells(case: Case) -> Iterator[Case]:
+    """Offer the run with parts of the solid cells of its map."""
+    place = case.values.get("place")
+    if place is None:
+        return
+    obstacles = place["world"]["obstacles"]
+    for k, grid in enumerate(obstacles):
+        if grid["type"] != "grid":
+            continue
+        for kept in _parts(range(len(grid["rows"]))):
+            fewer = grid | {"rows": [grid["rows"][row] for row in kept]}
+            world = place["world"] | {"obstacles": [*obstacles[:k], fewer, *obstacles[k + 1 :]]}
+            yield Case(case.values | {"place": place | {"world": world}}, case.forger)
 
 
 def _parts(items: Sequence[int]) -> Iterator[list[int]]:

@@ -17,8 +17,16 @@ NUMBERS = ("number", "robots", "under_way_s", "driving_s", "arrived", "wall_s", 
 KEPT = (*NUMBERS, "planner", "where", "again", "reasons", "refused", "breach")
 
 Row = dict[str, Any]
-Piece = tuple[str, str, int]
-"""Code, planners, seed: within these a number stands for one run."""
+
+
+class Piece(NamedTuple):
+    """Within a piece a number stands for one run."""
+
+    code: str
+    planners: str
+    covered: bool
+    seed: int
+
 
 
 class Sum(NamedTuple):
@@ -51,7 +59,7 @@ class Tally:
     def add(self, piece: Piece, revision: str, row: Mapping[str, Any]) -> bool:
         """Add a run; return whether it was not there yet."""
         rows = self.pieces.setdefault(piece, {})
-        self.revisions[piece[0]] = revision
+        self.revisions[piece.code] = revision
         if row["number"] in rows:
             return False
         rows[row["number"]] = {key: row[key] for key in KEPT if key in row}
@@ -61,7 +69,7 @@ class Tally:
         """Add all runs of another one."""
         for piece, rows in other.pieces.items():
             for row in rows.values():
-                self.add(piece, other.revisions[piece[0]], row)
+                self.add(piece, other.revisions[piece.code], row)
 
     def rows(self) -> list[Row]:
         """Return all runs."""
@@ -74,8 +82,8 @@ class Tally:
     def as_text(self) -> str:
         """Return it as JSON, a run on each line; the same runs give the same text."""
         pieces = []
-        for (code, planners, seed), rows in sorted(self.pieces.items()):
-            about = {"code": code, "revision": self.revisions[code], "planners": planners.split(), "seed": seed}
+        for piece, rows in sorted(self.pieces.items()):
+            about = {"revision": self.revisions[piece.code]} | piece._asdict()
             lines = ",\n".join(json.dumps(rows[number], sort_keys=True) for number in sorted(rows))
             pieces.append(json.dumps(about)[:-1] + f', "runs": [\n{lines}\n]}}')
         return f'{{"storms": {FORMAT}, "pieces": [\n' + ",\n".join(pieces) + "\n]}\n"
@@ -91,7 +99,8 @@ def read_tally(file: Path) -> Tally:
         if values["storms"] != FORMAT:
             raise InputFileError(file, f"is of format {values['storms']!r}, not {FORMAT}")
         for piece in values["pieces"]:
-            key = (str(piece["code"]), " ".join(piece["planners"]), int(piece["seed"]))
+            kinds = zip(Piece._fields, (str, str, bool, int), strict=True)
+            key = Piece(**{name: kind(piece[name]) for name, kind in kinds})
             for row in piece["runs"]:
                 _check(row)
                 found.add(key, str(piece["revision"]), row)

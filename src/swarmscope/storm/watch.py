@@ -95,7 +95,8 @@ class Watch:
 
     def _commands(self, sim: Sim) -> Found | None:
         v, w = sim.decisions["v"], sim.decisions["w"]
-        fine = np.isfinite(v) & np.isfinite(w) & (v >= 0.0) & (v <= sim.v_max + SLACK) & (np.abs(w) <= sim.w_max + SLACK)
+        fine = np.isfinite(v) & np.isfinite(w) & (v >= 0.0)
+        fine &= (v <= sim.v_max + SLACK) & (np.abs(w) <= sim.w_max + SLACK)
         bad = np.flatnonzero(~fine)
         if not bad.size:
             return None
