@@ -164,6 +164,7 @@ def _save(into: Path, mine: Tally) -> Tally:
 
 
 def _write_breaches(storm: Storm, broken: Sequence[dict[str, Any]], workers: int | None, out: Path) -> None:
+    sys.stdout.flush()
     print(f"making {min(len(broken), SHRUNK)} of {len(broken)} breaches small ...", file=sys.stderr)
     for number, text in shrink_all(storm, broken[:SHRUNK], workers):
         _put(out, f"breach-{storm.seed}-{number}.yaml", text)

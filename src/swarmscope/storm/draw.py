@@ -132,9 +132,13 @@ def _draw_once(
 
 
 def _leave_out(values: dict[str, Any]) -> None:
-    """Give the keys in `OPEN` their defaults."""
-    for group, _, key in (name.partition(".") for name in OPEN):
-        values.get(group, {}).pop(key, None)
+    """Keep the keys in `OPEN` within what storms have not broken."""
+    for name, span in OPEN.items():
+        group, _, key = name.partition(".")
+        value = values.get(group, {}).pop(key, None)
+        if value is not None and span is not None:
+            values[group][key] = min(span.high, max(span.low, value))
+    values["robot"]["half_width_m"] = values["robot"]["radius_m"]
 
 
 def _draw_task(rng: np.random.Generator) -> dict[str, Any]:

@@ -6,6 +6,7 @@ things in nearly every run) and ``noise.scan_age_s`` (turning between scan and d
 
 from __future__ import annotations
 
+import math
 from typing import Final, NamedTuple
 
 
@@ -119,5 +120,16 @@ STOOD_S: Final = 60.0
 TRIES: Final = 400
 """Draws before a number is given up."""
 
-OPEN: Final = ("lidar.fov_deg", "guard.clearance_m", "noise.nan")
-"""Keys that storms have found to break the guard (docs/storms.md): ``--covered`` leaves them at their defaults."""
+OPEN: Final[dict[str, Span | None]] = {
+    "lidar.fov_deg": None,
+    "guard.clearance_m": None,
+    "noise.nan": None,
+    "noise.dropout": None,
+    "noise.stuck": None,
+    "robot.radius_m": Span(0.15, math.inf),
+    "robot.v_max_mps": Span(0.0, 0.5),
+    "robot.a_max_mps2": Span(2.0, math.inf),
+    "lidar.rate_hz": Span(5.0, math.inf),
+}
+"""Keys with which storms have found contacts (docs/storms.md), and the span in which they have not; None: the default
+only. ``--covered`` keeps what is drawn within these."""

@@ -11,9 +11,14 @@ from swarmscope.errors import SwarmscopeError
 from swarmscope.storm.draw import Case, written_place
 from swarmscope.storm.forger import Forger
 from swarmscope.storm.play import watched
+from swarmscope.storm.ranges import WORK
 from swarmscope.storm.watch import Breach
 
 MOST_RUNS = 1000
+MOST_WORK = 20.0 * WORK
+"""Together they do no more than this: a minute or two."""
+LEAST_WORK = 1e5
+"""Of a run, however short."""
 GROUPS = ("noise", "faults", "radio")
 ROUNDED = ("robot", "lidar", "guard", "noise", "faults", "radio")
 DIGITS = (1, 2, 3)
@@ -58,6 +63,7 @@ class _Search:
     def __init__(self, case: Case, kind: str, left: int, play: Kind) -> None:
         self.case, self.kind, self.left, self.play = case, kind, left, play
         self.breach: Breach | None = None
+        self.work = MOST_WORK + _work(case)
 
     @property
     def best(self) -> str:
@@ -70,6 +76,9 @@ class _Search:
         if case is None or self.left <= 0:
             return False
         self.left -= 1
+        self.work -= _work(case)
+        if self.work <= 0.0:
+            self.left = 0
         breach = self.play(case)
         if breach is None or breach.kind != self.kind:
             return False
@@ -90,6 +99,13 @@ class _Search:
         limit = float(f"{(self.breach.tick + 1) / rate:.3f}")
         if 0.0 < limit < self.case.values.get("limit_s", 300.0):
             self.tries(Case(self.case.values | {"limit_s": limit}, self.case.forger))
+
+
+def _work(case: Case) -> float:
+    """Return how much work a run is, at most: robots times ticks times beams."""
+    lidar, values = case.values.get("lidar", {}), case.values
+    ticks = values.get("limit_s", 300.0) * lidar.get("rate_hz", 5.0)
+    return max(LEAST_WORK, float(values["robots"] * ticks * (lidar.get("beams", 360) + 200)))
 
 
 def _with(case: Case, change: Callable[[Values], Values]) -> Case | None:
