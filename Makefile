@@ -5,6 +5,7 @@ VENV    ?= .venv
 OUT     ?= runs/first
 WORKERS ?= 2
 MINUTES ?= 10
+SEED    ?= 0
 
 BIN   := $(VENV)/bin
 PIP   := $(BIN)/python -m pip --disable-pip-version-check --no-input
@@ -20,7 +21,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help run test check fuzz golden bench setup setup-dev clean
+.PHONY: help run test check fuzz storm golden bench setup setup-dev clean
 
 help: ## print this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -39,6 +40,9 @@ check: setup-dev ## linter, strict types, import contract
 
 fuzz: setup-dev ## run the property tests with new examples for MINUTES=10, until one fails
 	$(BIN)/python tests/fuzz.py --minutes $(MINUTES)
+
+storm: setup-dev ## look for contacts in random hostile runs for MINUTES=10; STORM_ARGS=--covered leaves known gaps out
+	$(BIN)/swarmscope storm --minutes $(MINUTES) --seed $(SEED) --workers $(WORKERS) $(STORM_ARGS)
 
 golden: setup-dev ## write the golden file of all planners' runs anew
 	$(BIN)/python tests/golden_runs.py --renew

@@ -11,6 +11,7 @@ from swarmscope.judging.statistics import (
     bootstrap_ratio,
     normal_quantile,
     paired_difference,
+    poisson_upper,
     sign_flip_p,
     wilson,
 )
@@ -110,3 +111,19 @@ def test_ratios_of_sums() -> None:
     assert one.estimate == 0.25 and math.isnan(one.low)
     with pytest.raises(ValueError, match="as many"):
         bootstrap_ratio([1.0], [1.0, 2.0])
+
+
+@pytest.mark.parametrize(("count", "bound"), [(0, 2.9957), (1, 4.7439), (2, 6.2958), (3, 7.7537), (10, 16.9622)])
+def test_the_bound_of_a_poisson_mean_is_that_of_the_tables(count: int, bound: float) -> None:
+    assert poisson_upper(count) == pytest.approx(bound, abs=1e-4)
+
+
+@given(st.integers(0, 500), st.floats(0.5, 0.999))
+def test_the_bound_of_a_poisson_mean_is_half_a_chi_square_quantile(count: int, confidence: float) -> None:
+    theirs = 0.5 * stats.chi2.ppf(confidence, 2 * count + 2)
+    assert poisson_upper(count, confidence) == pytest.approx(theirs, rel=1e-9)
+
+
+def test_nothing_counts_below_zero() -> None:
+    with pytest.raises(ValueError, match="at least 0"):
+        poisson_upper(-1)

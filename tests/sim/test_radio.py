@@ -8,9 +8,10 @@ import pytest
 from helpers import DT, place_sim
 from swarmscope.onboard.sharing.message import KIND_DIRECTED_REQUEST, KIND_FEATURES, KIND_LATENT, KIND_REQUEST
 from swarmscope.sim.cells import index_robots
-from swarmscope.sim.radio import exchange
+from swarmscope.sim.faults import strike
+from swarmscope.sim.radio import exchange, throw
 from swarmscope.sim.sensing import sense
-from swarmscope.sim.state import QUEUE, Radio
+from swarmscope.sim.state import QUEUE, Faults, Radio
 from swarmscope.sim.streams import BOOT, boot_number
 
 REQUEST, FEATURES = 9, 28
@@ -208,3 +209,40 @@ def test_the_channel_is_free_again_later():
         post(sim, 0, (1, REQUEST))
         exchange(sim, 10 * tick)
     assert sim.queue_due[1, :3] == pytest.approx(10 * DT * np.arange(3) + 0.032)
+
+
+def thrown(sim, tick, to, packet):
+    return throw(sim, tick, to, np.array(packet, np.uint8), len(packet))
+
+
+def test_a_thrown_packet_is_heard_at_the_next_tick_and_counts_for_nobody():
+    sim = line(2)
+    assert thrown(sim, 0, 1, [1, 2, 3])
+    assert heard(sim, 1, 1) == [[1, 2, 3]]
+    assert counters(sim, 0, "sent", "lost", "crowded") == counters(sim, 1, "sent", "lost", "crowded") == [0, 0, 0]
+    assert sim.robots["radio_free_s"].tolist() == [0.0, 0.0]
+
+
+def test_thrown_packets_take_the_room_of_others():
+    sim = line(2)
+    assert [thrown(sim, 0, 1, [k]) for k in range(QUEUE + 1)] == [True] * QUEUE + [False]
+    post(sim, 0, (1, FEATURES))
+    exchange(sim, 0)
+    assert counters(sim, 0, "sent", "crowded") == [1, 1]
+
+
+def test_who_is_not_there_and_what_is_no_packet_cannot_be_thrown():
+    sim = line(2)
+    data = np.zeros(1000, np.uint8)
+    for to, length in ((-1, 9), (2, 9), (40000, 9), (1, -1), (1, 141), (1, 1001)):
+        assert not throw(sim, 0, to, data, length)
+    sim.robots["crashed"][0], sim.robots["down_until"][1] = 1, 5
+    assert not thrown(sim, 0, 0, [1]) and not thrown(sim, 0, 1, [1])
+    assert thrown(sim, 5, 1, [1])
+
+
+def test_thrown_packets_that_are_lost_with_a_radio_are_nobodys_loss():
+    sim, _ = place_sim([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0)], faults=Faults(silences_per_h=3600.0 / DT))
+    thrown(sim, 0, 1, [1])
+    strike(sim, 1)
+    assert sim.robots["queued"].tolist() == [0, 0] and sim.robots["lost"].tolist() == [0, 0]

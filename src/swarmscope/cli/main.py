@@ -194,6 +194,45 @@ def barn(
         barn_command(worlds_of, planners, speeds, changes, worlds, every, workers, out, not no_code)
 
 
+@app.command(
+    epilog="Examples:\n\n"
+    "[bold]swarmscope storm --minutes 10 --seed 3[/bold]\n\n"
+    "[bold]swarmscope storm --minutes 600 --seed 4 --into storms.json[/bold]\n\n"
+    "[bold]swarmscope storm --runs 200 --planner mine.py[/bold]\n\n"
+    "[bold]swarmscope storm --replay 3:117[/bold]\n\n"
+    "[bold]swarmscope storm --replay runs/storm/breach-3-117.yaml[/bold]"
+)
+def storm(
+    minutes: Annotated[float | None, typer.Option(min=0.0, help="No run begins later; else 1 without --runs.")] = None,
+    runs: Annotated[int | None, typer.Option(min=1, help="Not more runs than these.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of everything that is drawn, with the number of a run.")] = 0,
+    into: Annotated[Path | None, typer.Option(help="JSON file that adds storms up; its runs are skipped.")] = None,
+    workers: Workers = None,
+    planner: Annotated[
+        list[str] | None, typer.Option(help="Planner or FILE.py, else all without training; repeatable.")
+    ] = None,
+    covered: Annotated[
+        bool, typer.Option("--covered", help="Leave out what storms are known to break (docs/storms.md).")
+    ] = False,
+    replay: Annotated[
+        str | None, typer.Option(metavar="SEED:NUMBER or FILE", help="Play this one run instead, or a breach's file.")
+    ] = None,
+    out: Annotated[Path, typer.Option(help="Folder for breaches made small.")] = Path("runs/storm"),
+    no_code: NoCode = False,
+) -> None:
+    """Look for contacts in random hostile runs; what none proves is a bound (docs/storms.md)."""
+    from swarmscope.cli.storm import replay_command, storm_command
+    from swarmscope.storm.play import Storm
+    from swarmscope.storm.runs import Until
+
+    which = Storm(seed, planner or [], covered)
+    if replay is not None:
+        replay_command(replay, which, out, not no_code)
+    else:
+        until = Until(1.0 if minutes is None and runs is None else minutes, runs)
+        storm_command(which, until, into, workers, out, not no_code)
+
+
 @new.command("task", epilog="Example: [bold]swarmscope new task ring[/bold]")
 def new_task(name: OwnName) -> None:
     """Write a task of your own to begin with, and a test for it."""

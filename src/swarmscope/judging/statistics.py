@@ -136,6 +136,27 @@ def sign_flip_p(differences: ArrayLike, seed: int = 0, resamples: int = RESAMPLE
     return (1.0 + float(np.sum(np.concatenate(sums) >= reached))) / (1.0 + resamples)
 
 
+def poisson_upper(count: int, confidence: float = 0.95) -> float:
+    """Return the mean of a Poisson variable below which it is at most ``count`` too often: the exact one-sided bound.
+
+    It solves P(X <= count) = 1 - confidence (Garwood 1936; half the chi-square quantile with 2 count + 2 degrees of
+    freedom), by bisection; for 0 it is -ln(1 - confidence), 3.0 at 95 %.
+    """
+    _check_confidence(confidence)
+    if count < 0:
+        raise ValueError(f"a count is at least 0, not {count}")
+    low, high = 0.0, 2.0 * count + 50.0 - math.log(1.0 - confidence)
+    while True:
+        middle = 0.5 * (low + high)
+        if middle in (low, high):
+            return middle
+        terms = [k * math.log(middle) - middle - math.lgamma(k + 1.0) for k in range(count + 1)]
+        if sum(map(math.exp, terms)) > 1.0 - confidence:
+            low = middle
+        else:
+            high = middle
+
+
 def normal_quantile(probability: float) -> float:
     """Return the z below which a standard normal variable lies with ``probability``, by bisection of erf."""
     if not 0.0 < probability < 1.0:

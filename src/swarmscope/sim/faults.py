@@ -89,9 +89,11 @@ def _jump(sim: Sim, tick: int, i: int) -> None:
 
 @jit_inner
 def _lose_mail(sim: Sim, i: int) -> None:
-    """Lose what is on the way to robot i; its senders count it."""
+    """Lose what is on the way to robot i; its senders count it, strangers do not."""
     for q in range(sim.robots[i]["queued"]):
-        sim.robots[sim.queue_from[i, q]]["lost"] += 1
+        sender = sim.queue_from[i, q]
+        if sender >= 0:
+            sim.robots[sender]["lost"] += 1
     sim.robots[i]["queued"] = 0
 
 

@@ -167,8 +167,16 @@ def _sense_next(sim: Sim, tick: int) -> bool:
     return False
 
 
-def run(setting: Setting, progress: Callable[[float, int], None] | None = None) -> Trace:
+Between = Callable[[Sim, int], bool]
+"""``(sim, tick)``, called when everybody has decided and nothing has been sent or driven yet; True: the last tick."""
+
+
+def run(
+    setting: Setting, progress: Callable[[float, int], None] | None = None, between: Between | None = None
+) -> Trace:
     """Run to the end; ``progress(simulated seconds, robots done)`` is called every now and then.
+
+    ``between`` looks at every tick, may throw packets at robots (`radio.throw`), and may end the run with it.
 
     The result does not depend on ``threads``: every kernel writes only its own robots' rows, random numbers
     are keyed, and what robots do to each other (radio, contacts) happens in the order of the robots.
@@ -191,8 +199,8 @@ def run(setting: Setting, progress: Callable[[float, int], None] | None = None) 
     step_all(0, 0)  # loads the kernels, so that no step's time contains that
     begun = time.perf_counter()
     pool.each(lambda a, b: sense(sim, 0, a, b))
-    tick, done = 0, False
-    while tick < ticks and not done:
+    tick, done, last = 0, False, False
+    while tick < ticks and not (done or last):
         row = tick % CHUNK
         if row == 0:
             chunks.append(new_records(min(CHUNK, ticks - tick), n, beams))
@@ -206,6 +214,7 @@ def run(setting: Setting, progress: Callable[[float, int], None] | None = None) 
             pool.each(step_all)
         for rows, blank in forgotten:
             forget(sim, tick, rows, blank)
+        last = between is not None and between(sim, tick)
         if pool.size == 1:
             done = world_phase(sim, swarm.safe, chunks[-1], row, beams > 0, tick)
         else:

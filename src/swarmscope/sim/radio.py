@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from swarmscope._jit import jit, jit_inner
 from swarmscope.onboard.percept import MAX_OUTBOX
 from swarmscope.onboard.sharing.message import MAX_PACKET_BYTES, is_request
 from swarmscope.sim.faults import is_off_air
 from swarmscope.sim.state import LINKS, QUEUE, Sim
 from swarmscope.sim.streams import RADIO_LOSS, key, mix, uniform
+
+STRANGER = -1
+"""Sender of packets that no robot has sent."""
 
 
 @jit
@@ -58,17 +63,39 @@ def _send(sim: Sim, tick: int, i: int, k: int) -> None:
         if chance < radio.loss:
             sender["lost"] += 1
             return
-    q = receiver["queued"]
-    if q >= QUEUE:
+    if not _queue(sim, j, i, begin + airtime + radio.latency_s, decision["out"][k], length):
         sender["crowded"] += 1
         return
-    sim.queue_due[j, q] = begin + airtime + radio.latency_s
-    sim.queue_length[j, q] = length
-    sim.queue_from[j, q] = i
-    for b in range(length):
-        sim.queue_data[j, q, b] = decision["out"][k, b]
-    receiver["queued"] = q + 1
     if features and sim.links_n[0] < LINKS:
         at = sim.links_n[0]
         sim.links[at, 0], sim.links[at, 1], sim.links[at, 2], sim.links[at, 3] = tick, i, j, length
         sim.links_n[0] = at + 1
+
+
+@jit_inner
+def _queue(sim: Sim, j: int, sender: int, due_s: float, data: np.ndarray, length: int) -> bool:
+    """Put a packet that arrives at ``due_s`` among those on their way to robot j; return whether there was room."""
+    receiver = sim.robots[j]
+    q = receiver["queued"]
+    if q >= QUEUE:
+        return False
+    sim.queue_due[j, q] = due_s
+    sim.queue_length[j, q] = length
+    sim.queue_from[j, q] = sender
+    for b in range(length):
+        sim.queue_data[j, q, b] = data[b]
+    receiver["queued"] = q + 1
+    return True
+
+
+@jit
+def throw(sim: Sim, tick: int, j: int, data: np.ndarray, length: int) -> bool:
+    """Throw a packet at robot j that no robot has sent, to be heard at the next tick; return whether it hears it.
+
+    It occupies no radio of the swarm, but takes room among the packets that robot j has not taken yet.
+    """
+    if j < 0 or j >= sim.robots.size or length < 0 or length > min(data.size, MAX_PACKET_BYTES):
+        return False
+    if sim.robots[j]["crashed"] or is_off_air(sim.robots[j], tick):
+        return False
+    return _queue(sim, j, STRANGER, tick * sim.clock.dt, data, length)

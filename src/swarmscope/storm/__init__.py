@@ -1,0 +1,1 @@
+"""Storms: random hostile runs that look for contacts, and what their absence proves."""
