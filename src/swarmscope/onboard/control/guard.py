@@ -16,11 +16,10 @@ from typing import NamedTuple
 import numpy as np
 
 from swarmscope._jit import jit, jit_inline, jit_inner
-from swarmscope.geometry import point_segment_distance
 from swarmscope.onboard.control.horizon import horizon_speed
-from swarmscope.onboard.control.unicycle import ramp
+from swarmscope.onboard.control.unseen import look_round, out_of_sight
+from swarmscope.onboard.control.way import STEPS, Way, closer, shadowed, way_of
 from swarmscope.onboard.percept import MAX_NEIGHBOURS, PEERS, Row
-from swarmscope.onboard.perception.frames import in_view, was_free
 from swarmscope.onboard.perception.mend import body_and_clearance, least_range
 from swarmscope.onboard.reasons import (
     R_HELD_BLIND,
@@ -34,8 +33,6 @@ from swarmscope.onboard.rig import Rig
 from swarmscope.onboard.sharing.tracks import near_track, returns_of
 from swarmscope.onboard.view import View
 
-STEPS = 4
-"""Straight pieces that stand for the arc driven until the next tick."""
 FRACTIONS = (1.0, 0.8, 0.6, 0.4, 0.2, 0.1, 0.05, 0.0)
 FREE = -1
 ROUNDING_M = 0.0005
@@ -44,28 +41,18 @@ STANDS_MPS = 1e-6
 SOME_LOSSES, MOST_LOSSES = 0.2, 0.35
 """Shares of returns lost from scan to scan from which on a robot slows down, and at which it stands. Of beams lost by
 chance with probability p a share p^3 is lost together with both beams beside them."""
-LOOK_SHARE = 0.4
-"""Of the field of view, by which a robot that looks round turns in a tick."""
-FRONT, FRONT_RAD = 5, 1.8
-"""The front of the body is looked at in so many places to either side, up to this angle [rad]."""
 
 
-class Way(NamedTuple):
-    """Where a command leads, body frame [m]: four points until the next tick, the stop after it, and the braking."""
+SIGMAS = 3.0
+"""A range may err by so many of the LiDAR's standard deviations."""
 
-    x1: float
-    y1: float
-    x2: float
-    y2: float
-    x3: float
-    y3: float
-    x4: float
-    y4: float
-    x5: float
-    y5: float
-    brake: float
-    turns: bool
-    """Whether it is not straight."""
+
+class Kept(NamedTuple):
+    """What the centre keeps off returns [m]."""
+
+    distance: float
+    spare: float
+    """What of it is there for errors of ranges."""
 
 
 class Near(NamedTuple):
@@ -95,7 +82,7 @@ def guard(see: View) -> bool:
     asked = min(rig.body.v_max_mps, max(0.0, asked))
     v, w, why = _allowed(see, asked, w)
     if rig.sensor.field > 0 and percept["speed"] <= STANDS_MPS:
-        v, w, why = _look_round(see, v, w, why)
+        v, w, why = look_round(see, v, w, why)
     out["v"], out["w"] = v, w
     if why != FREE and v == 0.0 and percept["speed"] <= STANDS_MPS:
         out["reason"] = why
@@ -133,21 +120,6 @@ def _allowed(see: View, asked: float, w: float) -> tuple[float, float, int]:
             return v, w, why
         why = held
     return 0.0, w if speed <= STANDS_MPS else 0.0, why
-
-
-@jit_inner
-def _look_round(see: View, v: float, w: float, why: int) -> tuple[float, float, int]:
-    """Return the command of a robot of limited view that stands, and why: it turns once round where it has not seen
-    what is beside its way, so slowly that scans overlap."""
-    shared, field = see.shared, see.rig.sensor.increment * see.rig.sensor.field
-    if shared["look_rad"] > 0.0:
-        shared["look_rad"] -= abs(see.percept["odom_yaw"])
-    elif why == R_HELD_UNSEEN and v == 0.0:
-        shared["look_rad"] = 2.0 * math.pi - 0.5 * field
-    if not shared["look_rad"] > 0.0:
-        return v, w, why
-    turn = min(see.rig.body.w_max_radps, LOOK_SHARE * field / see.percept["dt_s"])
-    return 0.0, turn if shared["unseen_left"] else -turn, R_HELD_UNSEEN
 
 
 @jit_inner
@@ -192,6 +164,7 @@ def _near(see: View, speed: float) -> Near:
     if guarding.others_mps > 0.0:
         stranger = 0.0 if guarding.others_yield else guarding.others_mps * (delay + speed / body.a_max_mps2)
         limit += max(way + 3.0 * brake, stranger)
+    limit /= max(0.5, 1.0 - SIGMAS * rig.sensor.range_sigma)
     least = least_range(rig)
     count = 0
     nearest = math.inf
@@ -205,25 +178,6 @@ def _near(see: View, speed: float) -> Near:
 
 
 @jit_inner
-def _way(speed: float, v: float, w: float, see: View) -> Way:
-    """Return the way of commanding (v, w) at ``speed``."""
-    a_max = see.rig.body.a_max_mps2
-    step = see.percept["dt_s"] / STEPS
-    x0 = speed * see.rig.guarding.latency_s
-    speed, way = ramp(speed, v, a_max, step)
-    x1, y1 = x0 + way * math.cos(0.5 * w * step), way * math.sin(0.5 * w * step)
-    speed, way = ramp(speed, v, a_max, step)
-    x2, y2 = x1 + way * math.cos(1.5 * w * step), y1 + way * math.sin(1.5 * w * step)
-    speed, way = ramp(speed, v, a_max, step)
-    x3, y3 = x2 + way * math.cos(2.5 * w * step), y2 + way * math.sin(2.5 * w * step)
-    speed, way = ramp(speed, v, a_max, step)
-    x4, y4 = x3 + way * math.cos(3.5 * w * step), y3 + way * math.sin(3.5 * w * step)
-    brake = speed * speed / (2.0 * a_max)
-    x5, y5 = x4 + brake * math.cos(4.0 * w * step), y4 + brake * math.sin(4.0 * w * step)
-    return Way(x1, y1, x2, y2, x3, y3, x4, y4, x5, y5, brake, w != 0.0)
-
-
-@jit_inner
 def _held_by(see: View, v: float, w: float, near: Near) -> int:
     """Return what holds a robot back from the command (v, w): FREE, or the reason.
 
@@ -231,20 +185,20 @@ def _held_by(see: View, v: float, w: float, near: Near) -> int:
     """
     rig, percept = see.rig, see.percept
     speed = percept["speed"]
-    way = _way(speed, v, w, see)
+    way = way_of(speed, v, w, see)
     if way.x5 * way.x5 + way.y5 * way.y5 + way.brake < 1e-10 and speed < STANDS_MPS:
         return FREE
     alone = not rig.guarding.others_mps > 0.0
     met = _met_by(v, percept["dt_s"], rig)
     if not alone and not _clear_of_tracks(see, way, met):
         return R_HELD_ROBOT
-    need = min(_distance_kept(v, w, see), near.nearest - 1e-6)  # already too close: never closer
+    kept = _distance_kept(v, w, see)
     for k in range(near.beams):
-        held = _held_by_beam(see, see.edges[k], way, met, need)
+        held = _held_by_beam(see, see.edges[k], way, met, kept)
         if held != FREE:
             return held
     if rig.sensor.field > 0:
-        x, y = _out_of_sight(see, way, need)
+        x, y = out_of_sight(see, way, min(kept.distance, near.nearest - 1e-6))
         if x != 0.0 or y != 0.0:
             see.shared["unseen_left"] = y > 0.0
             return R_HELD_UNSEEN
@@ -252,27 +206,35 @@ def _held_by(see: View, v: float, w: float, near: Near) -> int:
 
 
 @jit_inline
-def _distance_kept(v: float, w: float, see: View) -> float:
-    """Return how far the centre keeps off returns [m].
+def _distance_kept(v: float, w: float, see: View) -> Kept:
+    """Return how far the centre keeps off returns: the clearance covers what is not exact, or it is more than that.
 
-    The clearance, or more where it does not cover what shows between two beams beside the body, and how far an arc
-    bulges out of the straight pieces that stand for it.
+    Something may show between two beams beside the body, and an arc bulges out of the straight pieces drawn for it.
     """
     body, step = see.rig.body, see.percept["dt_s"] / STEPS
     hidden = 0.5 * see.rig.sensor.increment * body.radius_m + ROUNDING_M
     bulge = 0.125 * max(v, see.percept["speed"]) * abs(w) * step * step
-    kept: float = body.radius_m + max(see.rig.guarding.clearance_m, hidden + bulge)
-    return kept
+    kept = max(see.rig.guarding.clearance_m, hidden + bulge)
+    return Kept(body.radius_m + kept, kept - hidden - bulge)
+
+
+@jit_inline
+def _at_least(s: float, spare: float, rig: Rig) -> float:
+    """Return how near the return of range s may be [m], less what the clearance has to spare for that."""
+    return s - max(0.0, SIGMAS * rig.sensor.range_sigma * s - spare)
 
 
 @jit_inner
-def _held_by_beam(see: View, n: int, way: Way, met: float, need: float) -> int:
+def _held_by_beam(see: View, n: int, way: Way, met: float, kept: Kept) -> int:
     """Return how the return of beam n, or who may come out from behind it, forbids a way: FREE, or the reason."""
     rig, percept, s = see.rig, see.percept, see.scan[n]
-    if not s >= least_range(rig):
+    if s >= least_range(rig):
+        s = _at_least(s, kept.spare, rig)
+    else:
         s = body_and_clearance(rig)
+    need = min(kept.distance, s - 1e-6)  # already too close: never closer
     px, py = s * rig.cos[n], s * rig.sin[n]
-    if _closer(px, py, way, need) or (way.turns and _shadowed(px, py, rig.cos[n], rig.sin[n], way, need)):
+    if closer(px, py, way, need) or (way.turns and shadowed(px, py, rig.cos[n], rig.sin[n], way, need)):
         return R_HELD_THING
     if not rig.guarding.others_mps > 0.0:
         return FREE
@@ -281,81 +243,6 @@ def _held_by_beam(see: View, n: int, way: Way, met: float, need: float) -> int:
     if _is_corner(see.scan, n, rig) and not _stops_before(px, py, s, way, met, rig):
         return R_HELD_CORNER
     return FREE
-
-
-@jit_inner
-def _out_of_sight(see: View, way: Way, need: float) -> tuple[float, float]:
-    """Return a place that the body would sweep and that nobody has seen free [m], (0, 0) when there is none."""
-    x0, y0 = 0.0, 0.0
-    for piece in range(5):
-        x1, y1 = _corner_of(way, piece)
-        length = math.sqrt((x1 - x0) ** 2 + (y1 - y0) ** 2)
-        if length > 1e-9:
-            fx, fy = need * (x1 - x0) / length, need * (y1 - y0) / length
-            stops = int(math.ceil(length / (0.5 * need)))
-            for k in range(1, stops + 1):
-                part = k / stops
-                x, y = _unseen_front(see, x0 + part * (x1 - x0), y0 + part * (y1 - y0), fx, fy)
-                if x != 0.0 or y != 0.0:
-                    return x, y
-        x0, y0 = x1, y1
-    return 0.0, 0.0
-
-
-@jit_inner
-def _unseen_front(see: View, x: float, y: float, fx: float, fy: float) -> tuple[float, float]:
-    """Return a place on the front of the body at (x, y), which looks along f [m], that nobody has seen free."""
-    for k in range(-FRONT, FRONT + 1):
-        a = k * FRONT_RAD / FRONT
-        px, py = x + fx * math.cos(a) - fy * math.sin(a), y + fx * math.sin(a) + fy * math.cos(a)
-        if not in_view(px, py, see) and not was_free(see, px, py):
-            return px, py
-    return 0.0, 0.0
-
-
-@jit_inline
-def _corner_of(way: Way, piece: int) -> tuple[float, float]:
-    """Return where piece 0 to 4 of a way ends."""
-    if piece == 0:
-        return way.x1, way.y1
-    if piece == 1:
-        return way.x2, way.y2
-    if piece == 2:
-        return way.x3, way.y3
-    if piece == 3:
-        return way.x4, way.y4
-    return way.x5, way.y5
-
-
-@jit_inline
-def _closer(px: float, py: float, way: Way, need: float) -> bool:
-    """Tell whether the way comes closer than ``need`` [m] to the return at (px, py)."""
-    return bool(
-        point_segment_distance(px, py, 0.0, 0.0, way.x1, way.y1) < need
-        or point_segment_distance(px, py, way.x1, way.y1, way.x2, way.y2) < need
-        or point_segment_distance(px, py, way.x2, way.y2, way.x3, way.y3) < need
-        or point_segment_distance(px, py, way.x3, way.y3, way.x4, way.y4) < need
-        or point_segment_distance(px, py, way.x4, way.y4, way.x5, way.y5) < need
-    )
-
-
-@jit_inner
-def _shadowed(px: float, py: float, ux: float, uy: float, way: Way, need: float) -> bool:
-    """Tell whether a way that turns comes closer than ``need`` [m] to what the return at (px, py) hides.
-
-    That is the ray from there on along unit direction u. All of a straight way lies this side of its returns.
-    """
-    off4 = _off_ray(way.x4 - px, way.y4 - py, ux, uy)
-    off5 = _off_ray(way.x5 - px, way.y5 - py, ux, uy)
-    if abs(off4) < need or abs(off5) < need:
-        return True
-    return bool(off4 * off5 < 0.0 and off4 * off5 > -math.inf)
-
-
-@jit_inline
-def _off_ray(x: float, y: float, ux: float, uy: float) -> float:
-    """Return how far (x, y) lies beside the ray from the origin along u, left positive; inf behind its start."""
-    return ux * y - uy * x if ux * x + uy * y > 0.0 else math.inf
 
 
 @jit_inline

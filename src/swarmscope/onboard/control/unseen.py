@@ -1,0 +1,61 @@
+"""What a robot of limited view does about places that it has not seen: it keeps off them, and looks round."""
+
+from __future__ import annotations
+
+import math
+
+from swarmscope._jit import jit, jit_inner
+from swarmscope.onboard.control.way import Way, corner_of
+from swarmscope.onboard.perception.frames import in_view, was_free
+from swarmscope.onboard.reasons import R_HELD_UNSEEN
+from swarmscope.onboard.view import View
+
+LOOK_SHARE = 0.4
+"""Of the field of view, by which a robot that looks round turns in a tick."""
+FRONT, FRONT_RAD = 5, 1.8
+"""The front of the body is looked at in so many places to either side, up to this angle [rad]."""
+
+
+@jit
+def out_of_sight(see: View, way: Way, need: float) -> tuple[float, float]:
+    """Return a place that the body would sweep and that nobody has seen free [m], (0, 0) when there is none."""
+    x0, y0 = 0.0, 0.0
+    for piece in range(5):
+        x1, y1 = corner_of(way, piece)
+        length = math.sqrt((x1 - x0) ** 2 + (y1 - y0) ** 2)
+        if length > 1e-9:
+            fx, fy = need * (x1 - x0) / length, need * (y1 - y0) / length
+            stops = int(math.ceil(length / (0.5 * need)))
+            for k in range(1, stops + 1):
+                part = k / stops
+                x, y = _unseen_front(see, x0 + part * (x1 - x0), y0 + part * (y1 - y0), fx, fy)
+                if x != 0.0 or y != 0.0:
+                    return x, y
+        x0, y0 = x1, y1
+    return 0.0, 0.0
+
+
+@jit
+def look_round(see: View, v: float, w: float, why: int) -> tuple[float, float, int]:
+    """Return the command of a robot of limited view that stands, and why: it turns once round where it has not seen
+    what is beside its way, so slowly that scans overlap."""
+    shared, field = see.shared, see.rig.sensor.increment * see.rig.sensor.field
+    if shared["look_rad"] > 0.0:
+        shared["look_rad"] -= abs(see.percept["odom_yaw"])
+    elif why == R_HELD_UNSEEN and v == 0.0:
+        shared["look_rad"] = 2.0 * math.pi - 0.5 * field
+    if not shared["look_rad"] > 0.0:
+        return v, w, why
+    turn = min(see.rig.body.w_max_radps, LOOK_SHARE * field / see.percept["dt_s"])
+    return 0.0, turn if shared["unseen_left"] else -turn, R_HELD_UNSEEN
+
+
+@jit_inner
+def _unseen_front(see: View, x: float, y: float, fx: float, fy: float) -> tuple[float, float]:
+    """Return a place on the front of the body at (x, y), which looks along f [m], that nobody has seen free."""
+    for k in range(-FRONT, FRONT + 1):
+        a = k * FRONT_RAD / FRONT
+        px, py = x + fx * math.cos(a) - fy * math.sin(a), y + fx * math.sin(a) + fy * math.cos(a)
+        if not in_view(px, py, see) and not was_free(see, px, py):
+            return px, py
+    return 0.0, 0.0
