@@ -37,6 +37,12 @@ class Guarding(NamedTuple):
     """Age of a scan when its command takes effect."""
     thinnest_m: float = 0.02
     """Width of the narrowest thing that must not be missed between two beams."""
+    odometry_scale: float = 0.0
+    """By what share wheels err, in the same way all the time (1 sigma, as all of these)."""
+    odometry_drift_m: float = 0.0
+    """By how much the place by odometry errs after 1 m, at random [m/√m]."""
+    odometry_turn_rad: float = 0.0
+    """By how much the heading by odometry errs after 1 m, at random [rad/√m]."""
     others_mps: float = -1.0
     """How fast others may be; below 0: as fast as this robot; 0: nothing else moves."""
     others_yield: bool = True

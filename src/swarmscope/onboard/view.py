@@ -19,6 +19,8 @@ from swarmscope.onboard.sharing.message import HEADER_FIELDS, MAX_FEATURES
 
 FEWEST_FRAMES, FRAMES_PER_TURN = 6, 2.7
 """Scans that are kept where the view is limited: so many times as many as fill the circle."""
+POSE = 5
+"""Numbers that say where a scan was taken."""
 
 
 class Table(NamedTuple):
@@ -34,7 +36,7 @@ class Frames(NamedTuple):
     scans: np.ndarray
     """(K, F) float32, F beams of the field [m]: negative up to where nothing but a neighbour was, NaN: nobody knows."""
     poses: np.ndarray
-    """(K, 3): where each was taken, x, y [m], yaw [rad], body frame of now."""
+    """(K, 5): where each was taken, x, y [m], yaw [rad], body frame of now; way [m] and turning [rad] since then."""
 
 
 class View(NamedTuple):
@@ -116,7 +118,7 @@ def new_swarm(robots: int, rig: Rig) -> Swarm:
         scans=np.full((robots, beams), np.inf, np.float32),
         kept=np.zeros((robots, beams), np.float32),
         unseen=np.zeros((robots, beams), np.uint8),
-        frames=Frames(np.zeros((robots, frames, field), np.float32), np.zeros((robots, frames, 3))),
+        frames=Frames(np.zeros((robots, frames, field), np.float32), np.zeros((robots, frames, POSE))),
         masked=np.zeros((robots, beams), np.float32),
         safe=np.zeros((robots, beams), np.uint8),
         own=_table(robots),

@@ -64,7 +64,13 @@ def make_rig_of(scenario: Scenario) -> Rig:
     return make_rig(
         body,
         all_round(sensor),
-        Guarding(**guard.model_dump(exclude_none=True), latency_s=noise.scan_age_s),
+        Guarding(
+            **guard.model_dump(exclude_none=True),
+            latency_s=noise.scan_age_s,
+            odometry_scale=noise.odometry_scale,
+            odometry_drift_m=noise.odometry_drift_m,
+            odometry_turn_rad=math.radians(noise.odometry_turn_deg),
+        ),
         Safety(**safety.model_dump()),
         Sharing(exact_features=scenario.radio.exact_features),
     )

@@ -42,9 +42,9 @@ NOISE: Final = {
     "noise.bearing_deg": Span(0.0, 5.0),
     "noise.compass_deg": Span(0.0, 10.0),
     "noise.compass_bias_deg": Span(0.0, 10.0),
-    "noise.odometry_scale": Span(0.0, 0.1),
-    "noise.odometry_drift_m": Span(0.0, 0.1),
-    "noise.odometry_turn_deg": Span(0.0, 10.0),
+    "noise.odometry_scale": Span(0.0, 0.05),
+    "noise.odometry_drift_m": Span(0.0, 0.03),
+    "noise.odometry_turn_deg": Span(0.0, 5.0),
     "noise.nan": Span(0.0, 0.3),
     "noise.stuck": Span(0.0, 0.2),
 }

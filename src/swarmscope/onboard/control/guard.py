@@ -20,6 +20,7 @@ from swarmscope.onboard.control.horizon import horizon_speed
 from swarmscope.onboard.control.unseen import look_round, out_of_sight
 from swarmscope.onboard.control.way import STEPS, Way, closer, shadowed, way_of
 from swarmscope.onboard.percept import MAX_NEIGHBOURS, PEERS, Row
+from swarmscope.onboard.perception.frames import is_blurred
 from swarmscope.onboard.perception.mend import body_and_clearance, least_range
 from swarmscope.onboard.reasons import (
     R_HELD_BLIND,
@@ -106,7 +107,7 @@ def _unfit(see: View) -> int:
 def _allowed(see: View, asked: float, w: float) -> tuple[float, float, int]:
     """Return the fastest command up to ``asked`` [m/s] that passes, its turn rate, and why it is not faster."""
     percept, body = see.percept, see.rig.body
-    dt, speed = percept["dt_s"], percept["speed"]
+    dt, speed = percept["dt_s"], _speed_at_most(see)
     wanted = min(asked, _horizon_speed(see.rig, dt))
     if see.shared["losses"] > SOME_LOSSES:
         wanted *= (MOST_LOSSES - see.shared["losses"]) / (MOST_LOSSES - SOME_LOSSES)
@@ -120,6 +121,13 @@ def _allowed(see: View, asked: float, w: float) -> tuple[float, float, int]:
             return v, w, why
         why = held
     return 0.0, w if speed <= STANDS_MPS else 0.0, why
+
+
+@jit_inline
+def _speed_at_most(see: View) -> float:
+    """Return how fast the robot may be, wheels err [m/s]."""
+    speed: float = see.percept["speed"]
+    return speed * (1.0 + SIGMAS * see.rig.guarding.odometry_scale)
 
 
 @jit_inner
@@ -184,7 +192,7 @@ def _held_by(see: View, v: float, w: float, near: Near) -> int:
     The way keeps clear of every return, out of others' halves, and within what was seen.
     """
     rig, percept = see.rig, see.percept
-    speed = percept["speed"]
+    speed = _speed_at_most(see)
     way = way_of(speed, v, w, see)
     if way.x5 * way.x5 + way.y5 * way.y5 + way.brake < 1e-10 and speed < STANDS_MPS:
         return FREE
@@ -195,6 +203,9 @@ def _held_by(see: View, v: float, w: float, near: Near) -> int:
     kept = _distance_kept(v, w, see)
     for k in range(near.beams):
         held = _held_by_beam(see, see.edges[k], way, met, kept)
+        if held == R_HELD_THING and rig.sensor.field > 0 and is_blurred(see, see.edges[k]):
+            see.shared["unseen_left"] = rig.sin[see.edges[k]] > 0.0
+            return R_HELD_UNSEEN
         if held != FREE:
             return held
     if rig.sensor.field > 0:

@@ -14,14 +14,17 @@ import numpy as np
 from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.geometry import wrap_angle
 from swarmscope.onboard.percept import PEERS, Row
-from swarmscope.onboard.perception.mend import body_and_clearance
+from swarmscope.onboard.perception.mend import body_and_clearance, least_range
+from swarmscope.onboard.rig import Rig
 from swarmscope.onboard.sharing.tracks import near_track
-from swarmscope.onboard.view import View
+from swarmscope.onboard.view import POSE, View
 
 STEP_RADII = 0.4
 """After a way of so many radii another scan is kept, ..."""
 STEP_SHARE = 0.4
 """... or after a turn by this share of the field of view."""
+SIGMAS = 3.0
+"""Odometry may err by so many standard deviations."""
 SAME_RADII, SAME_SHARE = 0.2, 0.15
 """A scan kept from this close by, turned by less than this share of the field, gives way to the new one."""
 
@@ -57,10 +60,38 @@ def _move_on(percept: Row, poses: np.ndarray) -> None:
     """Express where scans were taken in the body frame of now."""
     dx, dy, turned = percept["odom_x"], percept["odom_y"], percept["odom_yaw"]
     c, s = math.cos(turned), math.sin(turned)
+    way = math.sqrt(dx * dx + dy * dy)
     for k in range(len(poses)):
         x, y = poses[k, 0] - dx, poses[k, 1] - dy
         poses[k, 0], poses[k, 1] = c * x + s * y, c * y - s * x
         poses[k, 2] = wrap_angle(poses[k, 2] - turned)
+        poses[k, 3] += way
+        poses[k, 4] += abs(turned)
+
+
+@jit_inline
+def _astray(pose: np.ndarray, reach: float, rig: Rig) -> float:
+    """Return how far what a kept scan shows ``reach`` [m] from here may be from where odometry puts it [m]."""
+    return _drifted(pose, reach, rig) + SIGMAS * rig.guarding.odometry_scale * float(pose[4]) * reach
+
+
+@jit_inline
+def _drifted(pose: np.ndarray, reach: float, rig: Rig) -> float:
+    """Return the same for the way alone, without the turning."""
+    guarding, way = rig.guarding, float(pose[3])
+    at_random = guarding.odometry_drift_m + guarding.odometry_turn_rad * reach
+    return SIGMAS * (guarding.odometry_scale * way + at_random * math.sqrt(way))
+
+
+@jit
+def is_blurred(see: View, n: int) -> bool:
+    """Tell whether beam n is out of view, and the kept scans so old that they show things nearer than they may be."""
+    if see.shared["view_first"] <= n <= see.shared["view_last"]:
+        return False
+    for k in range(see.shared["frames_n"]):
+        if _drifted(see.frames.poses[k], see.rig.body.radius_m, see.rig) > see.rig.guarding.clearance_m:
+            return True
+    return False
 
 
 @jit_inner
@@ -68,6 +99,7 @@ def _draw(see: View, scan: np.ndarray, pose: np.ndarray) -> None:
     """Lower the beams out of view to what a kept scan shows there."""
     sensor, shared = see.rig.sensor, see.shared
     c, si = math.cos(pose[2]), math.sin(pose[2])
+    least = least_range(see.rig)
     for j in range(scan.size):
         s = scan[j]
         if not 0.0 < s < sensor.range_max:
@@ -78,7 +110,8 @@ def _draw(see: View, scan: np.ndarray, pose: np.ndarray) -> None:
         if shared["view_first"] <= n <= shared["view_last"]:
             continue
         distance = math.sqrt(x * x + y * y)
-        see.scan[n] = min(see.scan[n], distance)
+        distance -= _astray(pose, distance, see.rig)
+        see.scan[n] = min(see.scan[n], max(distance, least))
 
 
 @jit_inner
@@ -109,7 +142,7 @@ def keep_frame(see: View) -> None:
         return
     see.shared["frames_n"] = max(see.shared["frames_n"], at + 1)
     see.shared["frame_at"] = at
-    for k in range(3):
+    for k in range(POSE):
         see.frames.poses[at, k] = 0.0
     _copy(see, see.frames.scans[at])
 
@@ -164,15 +197,17 @@ def in_view(x: float, y: float, see: View) -> bool:
 def was_free(see: View, x: float, y: float) -> bool:
     """Tell whether the point (x, y), body frame [m], outside the view, has been seen free."""
     sensor, core = see.rig.sensor, see.rig.body.radius_m
-    if x * x + y * y < core * core:
+    reach = math.sqrt(x * x + y * y)
+    if reach < core:
         return True
     for k in range(see.shared["frames_n"]):
         pose = see.frames.poses[k]
         px, py = x - pose[0], y - pose[1]
-        if px * px + py * py < core * core:
+        far = math.sqrt(px * px + py * py) + _astray(pose, reach, see.rig)
+        if far < core:
             return True
         bearing = math.atan2(py, px) - pose[2]
         n = int(math.floor((bearing - sensor.angle_min) / sensor.increment + 0.5)) % sensor.beams - sensor.first
-        if 0 <= n < sensor.field and px * px + py * py <= see.frames.scans[k, n] ** 2:
+        if 0 <= n < sensor.field and far <= abs(see.frames.scans[k, n]):
             return True
     return False
