@@ -65,7 +65,7 @@ All of it is off by default, drawn from the seed, for each robot by itself, and 
 one leaves those of the others alone.
 
 - **Wheels** (`noise.odometry_*`). The robot measures its motion wrongly: speed and way scaled alike, the way with a random walk on top. It drives what it
-  commands. Of what a robot is told, odometry moves its tracks of neighbours and its memory of places; goal and heading come from elsewhere.
+  commands. Of what a robot is told, odometry moves its tracks of neighbours and its memory of places; goal and heading come from elsewhere, and it steadies them.
 - **Compass.** `compass_deg` is drawn for every scan, `compass_bias_deg` once for each robot; they add up. They turn the goal, features that are sent and
   heard, and what neighbours see of the heading.
 - **LiDAR.** In this order: error of the range, lost returns (`dropout`), beams that say the longest range (`stuck`), the blind sector (`blind_deg`), broken

@@ -41,9 +41,10 @@ def rig_of(body=None, sensor=None, **options):
 
 
 def beams_of(rig):
+    """What the LiDAR of a rig casts: all beams of its sensor, or those of a limited field of view."""
     sensor = rig.sensor
-    fov = sensor.increment * (sensor.beams if sensor.wraps else sensor.beams - 1)
-    return make_beams(sensor.beams, fov, sensor.range_max)
+    beams, closed = sensor.field or sensor.beams, sensor.wraps and sensor.field == 0
+    return make_beams(beams, sensor.increment * (beams if closed else beams - 1), sensor.range_max)
 
 
 def world_of(*obstacles, bounds=BOUNDS):

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from swarmscope.errors import ConfigError
 from swarmscope.onboard.lidar import Lidar, check_lidar, grid_of, lay_out, layout_of, sensor_of
+from swarmscope.onboard.sensor import all_round
 from swarmscope.sim.lidar import make_beams
 
 
@@ -31,7 +32,29 @@ def test_the_usual_scan_lies_as_the_simulator_casts_it(beams, fov):
     sensor = sensor_of(Lidar(beams, 5.0, fov_deg=fov), grid_of(layout))
     assert (layout.order == np.arange(beams)).all()
     assert (sensor.angle_min, sensor.increment, sensor.wraps) == (cast.angle_min, cast.increment, cast.wraps)
-    assert [type(v) for v in sensor] == [int, float, float, bool, float, float, float, float]
+    assert (sensor.first, sensor.field) == (0, 0)
+    assert [type(v) for v in sensor] == [int, float, float, bool, float, float, float, float, int, int]
+
+
+@pytest.mark.parametrize(
+    ("beams", "fov", "total", "first"),
+    [
+        (181, 180.0, 360, 89),  # 1 degree apart: 179 beams are not in view, 89 of them before the first one
+        (1081, 270.0, 1440, 179),
+        (64, 57.0, 397, 166),  # 0.905 degrees apart: 397.9 fit into the circle
+        (100, 357.0, 100, 0),  # 3.606 degrees apart, 3 are left: no beam fits between the last and the first
+    ],
+)
+def test_a_limited_view_is_a_part_of_the_full_circle(beams, fov, total, first):
+    lidar = check_lidar(Lidar(beams, 5.0, fov_deg=fov))
+    part = sensor_of(lidar, grid_of(layout_of(lidar)))
+    whole = all_round(part)
+    assert (whole.beams, whole.first, whole.field) == (total, first, beams if total > beams else 0)
+    assert whole.wraps and whole.increment == part.increment
+    assert whole.angle_min + first * whole.increment == pytest.approx(math.radians(-0.5 * fov))
+    left = 2.0 * math.pi - whole.increment * (total - 1)
+    assert 0.5 * whole.increment < left < 2.0 * whole.increment
+    assert all_round(whole) == whole
 
 
 lidars = st.fixed_dictionaries(

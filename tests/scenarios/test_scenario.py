@@ -179,7 +179,9 @@ def test_settings_reach_the_kernels_in_their_units():
     assert (setting.radio.loss, setting.radio.latency_s, setting.radio.range_m) == (0.2, 0.3, 7.0)
     assert (setting.dt, setting.limit_s, setting.seed, setting.threads) == (0.1, 12.0, 9, 2)
     rig = make_rig_of(scenario)
-    assert (rig.sensor.beams, rig.sensor.range_max, rig.sensor.wraps) == (90, 8.0, False)
+    assert (setting.beams.cos.size, setting.beams.wraps, setting.beams.range_max) == (90, False, 8.0)
+    sensor = rig.sensor  # the same beams in the full circle: pi / 89 apart, 44 before them
+    assert (sensor.beams, sensor.first, sensor.field, sensor.wraps, sensor.range_max) == (178, 44, 90, True, 8.0)
     assert (rig.body.radius_m, rig.body.v_max_mps, rig.guarding.clearance_m) == (0.2, 0.4, 0.05)
 
 

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from helpers import DT, circles_world, make_sensor, place_sim, rig_of, wall, world_of
 from swarmscope.onboard.percept import MAX_INBOX, MAX_NEIGHBOURS
+from swarmscope.onboard.sensor import all_round
 from swarmscope.sim.cells import index_robots
 from swarmscope.sim.sensing import sense
 from swarmscope.sim.state import Noise
@@ -62,12 +63,23 @@ def test_a_wall_hides_a_neighbour_and_a_robot_too():
     assert neighbours(sim, 3)[0] == [1, 2]  # past the wall's end
 
 
-def test_nobody_is_seen_beyond_the_lidars_range_or_outside_its_field_of_view():
+def test_nobody_is_seen_beyond_the_lidars_range():
     assert neighbours(sensed([(0.0, 0.0, 0.0), (5.3, 0.0, 0.0)]), 0)[0] == []
     assert neighbours(sensed([(0.0, 0.0, 0.0), (5.1, 0.0, 0.0)]), 0)[0] == [1]
-    rig = rig_of(sensor=make_sensor(beams=181, fov=math.pi))
-    sim = sensed([(0.0, 0.0, 0.0), (2.0, 0.5, 0.0), (-2.0, 0.0, 0.0)], rig=rig)
-    assert neighbours(sim, 0)[0] == [1]
+
+
+def test_positioning_works_all_round_where_the_lidar_looks_ahead_only():
+    """Robots 1 ahead, 2 behind, 3 behind 2, 4 out of range behind, 5 to the left."""
+    starts = [(0.0, 0.0, 0.0), (2.1, 0.5, 0.0), (-2.0, 0.0, 0.0), (-3.0, 0.0, 0.0), (-4.0, 3.3, 0.0), (-0.5, 2.5, 0.0)]
+    rig = rig_of(sensor=all_round(make_sensor(beams=181, fov=math.pi)))
+    sim = sensed(starts, rig=rig)
+    ids, places = neighbours(sim, 0)
+    assert ids == [2, 1, 5]
+    assert places[0] == pytest.approx([-2.0, 0.0])
+    assert np.isinf(sim.scans[0, :89]).all() and np.isinf(sim.scans[0, 270:]).all()  # behind, no beam measures
+    assert np.isfinite(sim.scans[0, 89:270]).any()
+    behind_a_wall = sensed(starts, rig=rig, world=world_of(wall((-1.0, -1.0), (-1.0, 1.0))))
+    assert neighbours(behind_a_wall, 0)[0] == [1, 5]
 
 
 def test_no_more_than_the_table_holds_and_those_are_the_nearest():

@@ -27,7 +27,7 @@ NEVER_S = -1e9
 
 PERCEPT = np.dtype(
     [
-        ("now_s", np.float64),  # the robot's own clock, after ``perceive`` without its jumps [s]
+        ("now_s", np.float64),  # the robot's own clock, after ``perceive`` the time since its first tick [s]
         ("dt_s", np.float64),  # time until the next tick [s]
         ("goal_bearing", np.float64),  # of the goal, body frame [rad]
         ("goal_distance", np.float64),  # [m]
@@ -130,7 +130,9 @@ SHARED = np.dtype(
         ("dropped_stale", np.int64),  # old, replayed or unasked-for packets
         ("started", np.uint8),
         ("clock_s", np.float64),  # what the clock said at the last tick
-        ("ahead_s", np.float64),  # by how much it has jumped, forward positive
+        ("base_s", np.float64),  # its own time (``perception/clock.py``): so much, ...
+        ("even_n", np.int64),  # ... and since then so many ticks on time, ...
+        ("even_s", np.float64),  # ... each of so much
         ("compass", np.float64),  # of the last tick
         ("view_first", np.int64),  # beams of a limited field of view between which something is known
         ("view_last", np.int64),

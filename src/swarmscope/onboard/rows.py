@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from swarmscope.onboard.percept import DECISION, PERCEPT, Row
+from swarmscope.onboard.perception.clock import skip_to
 from swarmscope.onboard.planners import Planner
 from swarmscope.onboard.rig import Rig
 from swarmscope.onboard.view import View, new_swarm, python_view
@@ -60,9 +61,9 @@ class Rows:
             self._given[name][0] = value
 
     def set_time(self, now_s: float, dt_s: float) -> None:
-        """Set a time that has passed since the last call of the planner, however long ago that was."""
+        """Set a time since the first tick, of which all has passed, however long ago the planner was called last."""
         self.fill(now_s=now_s, dt_s=dt_s)
-        self.shared["clock_s"], self.shared["ahead_s"] = now_s - dt_s, 0.0
+        skip_to(self.shared, now_s - dt_s)
 
     def see(self, neighbours: list[Any]) -> None:
         """Set the neighbours (``Seen``), at most MAX_NEIGHBOURS, nearest first."""

@@ -244,12 +244,23 @@ def test_a_replayed_and_a_second_answer_are_dropped(model):
     assert robots.shared["answers_n"][0] == 1
 
 
-def test_an_answer_that_comes_too_late_is_dropped(model):
+@pytest.mark.parametrize(("ticks", "dropped"), [(5, 0), (6, 1)])
+def test_an_answer_that_comes_too_late_is_dropped(model, ticks, dropped):
+    """It is 1.4 s and 1.6 s old; features are used for 1.5 s."""
+    robots = Robots(planner_of(model)).step()
+    answer = robots.exchange()
+    for _ in range(ticks):
+        robots.step()
+    robots.hand(0, answer).step()
+    assert robots.dropped == (0, dropped)
+
+
+def test_an_answer_is_heard_though_the_clock_leaps(model):
     robots = Robots(planner_of(model)).step()
     answer = robots.exchange()
     robots.percepts["now_s"] += 2.0
     robots.hand(0, answer).step()
-    assert robots.dropped == (0, 1)
+    assert (robots.dropped, robots.decisions["heard"][0]) == ((0, 0), 1)
 
 
 def test_answers_for_another_direction_are_not_used(model):

@@ -142,7 +142,7 @@ def test_the_oracle_changes_its_mind_at_decisions_only():
     robot.memory["told"] = -1
     for _ in range(5):
         assert tick(robot)["side"] == 1
-    robot.scan[:] = np.inf
+    robot.scan[:] = 4.0  # it is gone: what stands behind it shows
     assert tick(robot)["state"] == ADVANCE
     robot.fill(odom_x=1.0)  # far from the last obstacle: a new decision
     tick(robot)
