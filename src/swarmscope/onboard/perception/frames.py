@@ -16,7 +16,7 @@ from swarmscope.geometry import wrap_angle
 from swarmscope.onboard.percept import PEERS, Row
 from swarmscope.onboard.perception.mend import body_and_clearance, least_range
 from swarmscope.onboard.rig import Rig
-from swarmscope.onboard.sharing.tracks import near_track
+from swarmscope.onboard.sharing.tracks import on_track
 from swarmscope.onboard.view import POSE, View
 
 STEP_RADII = 0.4
@@ -25,6 +25,8 @@ STEP_SHARE = 0.4
 """... or after a turn by this share of the field of view."""
 SIGMAS = 3.0
 """Odometry may err by so many standard deviations."""
+LOOK_RADII = 0.2
+"""After a way of so many radii another look is worth while."""
 SAME_RADII, SAME_SHARE = 0.2, 0.15
 """A scan kept from this close by, turned by less than this share of the field, gives way to the new one."""
 
@@ -85,11 +87,18 @@ def _drifted(pose: np.ndarray, reach: float, rig: Rig) -> float:
 
 @jit
 def is_blurred(see: View, n: int) -> bool:
-    """Tell whether beam n is out of view, and the kept scans so old that they show things nearer than they may be."""
+    """Tell whether beam n is out of view and another look may change what it shows.
+
+    Where positioning errs it may have been a neighbour, or the way since then makes things seem nearer than they are.
+    """
     if see.shared["view_first"] <= n <= see.shared["view_last"]:
         return False
+    radius = see.rig.body.radius_m
     for k in range(see.shared["frames_n"]):
-        if _drifted(see.frames.poses[k], see.rig.body.radius_m, see.rig) > see.rig.guarding.clearance_m:
+        pose = see.frames.poses[k]
+        if see.rig.sensor.position_sigma > 0.0 and pose[3] > LOOK_RADII * radius:
+            return True
+        if _drifted(pose, radius, see.rig) > see.rig.guarding.clearance_m:
             return True
     return False
 
@@ -166,7 +175,7 @@ def _slot(see: View) -> int:
 
 @jit_inner
 def _copy(see: View, out: np.ndarray) -> None:
-    """Keep the scan: negative where the return may be a neighbour's (free up to there), NaN where nothing is known.
+    """Keep the scan: negative where the return is a neighbour's (free up to there), NaN where nothing is known.
 
     What was broken counts as seen where it was bridged, not where the hole was so wide that it blocks.
     """
@@ -178,7 +187,7 @@ def _copy(see: View, out: np.ndarray) -> None:
             out[j] = math.nan
         elif not see.filtered[n] >= 0.0:
             out[j] = -s if touching < s < math.inf else math.nan
-        elif s < rig.sensor.range_max and near_track(see.percept, see.shared, s * rig.cos[n], s * rig.sin[n], rig):
+        elif s < rig.sensor.range_max and on_track(see.percept, see.shared, s * rig.cos[n], s * rig.sin[n], rig):
             out[j] = -s
         else:
             out[j] = s

@@ -11,6 +11,8 @@ from swarmscope.onboard.percept import PEERS, Row
 from swarmscope.onboard.rig import Rig
 from swarmscope.onboard.view import View
 
+SKIN_M = 0.01
+"""What lies no farther outside a neighbour's body is the body."""
 STILL_RADIUS = 0.08
 """A neighbour that stays within this of one place stands still [m]."""
 
@@ -188,13 +190,24 @@ def neighbour_reach(distance: float, rig: Rig) -> float:
 @jit
 def near_track(percept: Row, shared: Row, px: float, py: float, rig: Rig) -> bool:
     """Tell whether the return at (px, py), body frame, may belong to a neighbour."""
+    return _near_track(percept, shared, px, py, rig, False)
+
+
+@jit
+def on_track(percept: Row, shared: Row, px: float, py: float, rig: Rig) -> bool:
+    """Tell whether the return at (px, py), body frame, lies where a neighbour's body is, errors left aside."""
+    return _near_track(percept, shared, px, py, rig, True)
+
+
+@jit_inner
+def _near_track(percept: Row, shared: Row, px: float, py: float, rig: Rig, exactly: bool) -> bool:
     c, s = math.cos(percept["compass"]), math.sin(percept["compass"])
     gx, gy = c * px - s * py, s * px + c * py
     for t in range(PEERS):
         if shared["track_id"][t] < 0:
             continue
-        ex, ey = gx - shared["track_x"][t], gy - shared["track_y"][t]
-        reach = neighbour_reach(math.sqrt(shared["track_x"][t] ** 2 + shared["track_y"][t] ** 2), rig)
-        if ex * ex + ey * ey <= reach * reach:
+        x, y = shared["track_x"][t], shared["track_y"][t]
+        reach = rig.body.radius_m + SKIN_M if exactly else neighbour_reach(math.sqrt(x * x + y * y), rig)
+        if (gx - x) ** 2 + (gy - y) ** 2 <= reach * reach:
             return True
     return False
