@@ -38,10 +38,10 @@ def perceive(see: View, still_s: float) -> None:
     move_on(see)
     if see.rig.sensor.field > 0:
         look_back(see)
-    mend(see.scan, see.rig)
+    broken = mend(see.scan, see.rig, see.safe)
     if see.rig.sensor.field > 0:
         keep_frame(see)
-    keep_lost(see)
+    keep_lost(see, broken)
     mask_moving_neighbours(see, still_s)
     safe_directions(see.masked, see.rig.sensor, see.reach[AHEAD], see.edges, see.safe)
 

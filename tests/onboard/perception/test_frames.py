@@ -44,7 +44,7 @@ class Robot:
         dx, dy = update_odometry(rows.percept, rows.shared)
         update_tracks(rows.percept, rows.shared, rows.rig, dx, dy)
         look_back(view)
-        mend(view.scan, rows.rig)
+        mend(view.scan, rows.rig, view.safe)
         keep_frame(view)
         found = np.flatnonzero(np.isfinite(view.scan))
         return {math.remainder(n - 179, 360): pytest.approx(float(view.scan[n]), abs=1e-5) for n in found.tolist()}

@@ -10,6 +10,7 @@ import pytest
 from helpers import DT, make_sensor, one_robot, rig_of, seen
 from swarmscope.onboard.perception.frames import look_back
 from swarmscope.onboard.perception.lost import MEMORY, WITHIN, keep_lost
+from swarmscope.onboard.perception.mend import mend
 from swarmscope.onboard.sensor import all_round
 from swarmscope.onboard.sharing.tracks import update_odometry, update_tracks
 
@@ -28,8 +29,9 @@ def scan_of(**returns):
 def given(rows, scan, moved=(0.0, 0.0, 0.0)):
     """Tell the robot a scan and how it has moved since the last; return the scan with what it has kept."""
     rows.scan[:] = scan
+    broken = mend(rows.scan, rows.rig, rows.view.safe)
     rows.fill(odom_x=moved[0], odom_y=moved[1], odom_yaw=moved[2])
-    keep_lost(rows.view)
+    keep_lost(rows.view, broken)
     return rows.scan.copy()
 
 
@@ -121,7 +123,7 @@ def test_what_leaves_a_limited_view_is_not_lost():
         view.scan[:] = scan
         rows.fill(odom_yaw=turn)
         look_back(view)
-        keep_lost(view)
+        keep_lost(view, 0)
     assert returns(view.scan) == {160: 2.0}
 
 
@@ -162,3 +164,27 @@ def test_what_left_the_range_is_not_blindness():
     given(rows, scan_of(at_180=4.6))
     given(rows, scan_of())
     assert (rows.shared["blind_s"], rows.shared["losses"]) == (0.0, 0.0)
+
+
+def test_a_broken_beam_has_not_passed_the_place_where_something_was():
+    wall = np.full(360, 3.0, np.float32)
+    wall[AHEAD] = 0.5
+    torn = wall.copy()
+    torn[AHEAD] = np.nan
+    rows = one_robot()
+    given(rows, wall)
+    assert given(rows, torn)[AHEAD] == np.float32(0.5)  # bridged from beside it would be 3 m
+    for _ in range(3):
+        assert given(rows, torn)[AHEAD] == np.float32(0.5)
+    assert given(rows, np.full(360, 3.0, np.float32))[AHEAD] == np.float32(3.0)
+    assert given(rows, torn)[AHEAD] == np.float32(3.0)
+    assert rows.shared["losses"] == 0.0
+
+
+def test_what_a_hole_was_bridged_with_is_not_kept():
+    torn = np.full(360, 3.0, np.float32)
+    torn[AHEAD], torn[AHEAD + 1] = np.nan, 1.0
+    rows = one_robot()
+    assert given(rows, torn)[AHEAD] == np.float32(1.0)
+    torn[AHEAD + 1] = 3.0
+    assert given(rows, torn)[AHEAD] == np.float32(3.0)

@@ -26,20 +26,22 @@ def body_and_clearance(rig: Rig) -> float:
 
 
 @jit
-def mend(ranges: np.ndarray, rig: Rig) -> int:
+def mend(ranges: np.ndarray, rig: Rig, broken: np.ndarray) -> int:
     """Replace broken readings (NaN, below ``least_range``) of ``ranges (M,)`` [m] in place; return how many there were.
+
+    ``broken (M,)`` uint8 becomes 1 for each of them, 0 for the others.
 
     A run of them becomes as near as the nearer of the two readings beside it, and never farther than a body in
     the hole could be; with nothing sound beside it, it is what touches the body.
     """
     least = least_range(rig)
-    broken = 0
+    count = 0
     for n in range(ranges.size):
-        if not ranges[n] >= least:
-            broken += 1
-    if broken > 0:
+        broken[n] = not ranges[n] >= least
+        count += broken[n]
+    if count > 0:
         _bridge(ranges, rig, least)
-    return broken
+    return count
 
 
 @jit_inner
