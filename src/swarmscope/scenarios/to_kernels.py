@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -61,13 +62,19 @@ def make_rig_of(scenario: Scenario) -> Rig:
     )
     body = Body(**robot.model_dump())
     guard, safety = scenario.guard, scenario.safety
-    return make_rig(
+    return _latest_rig(
         body,
         all_round(sensor),
         Guarding(**guard.model_dump(exclude_none=True), latency_s=noise.scan_age_s),
         Safety(**safety.model_dump()),
         Sharing(exact_features=scenario.radio.exact_features),
     )
+
+
+@lru_cache(maxsize=1)
+def _latest_rig(body: Body, sensor: Sensor, guarding: Guarding, safety: Safety, sharing: Sharing) -> Rig:
+    """Return the rig of this data sheet; that of the last one asked for, whose tables take long, is kept."""
+    return make_rig(body, sensor, guarding, safety, sharing)
 
 
 def planner_of(chosen: PlannerModel) -> Planner:
