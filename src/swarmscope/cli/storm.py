@@ -86,7 +86,7 @@ def replay_command(what: str, storm: Storm, out: Path, code: bool) -> None:
     drawn = draw(seed, index, _checked(storm.planners, code), storm.covered)
     if isinstance(drawn, dict):
         raise ConfigError(f"--replay {what}", "no possible run was drawn under this number")
-    played = watched(drawn.case, drawn.again)
+    played = watched(drawn.case, drawn.again, drawn.setup)
     if not _tell(played) or played.breach is None:
         return
     breach = played.breach

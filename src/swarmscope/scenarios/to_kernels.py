@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -61,7 +62,7 @@ def make_rig_of(scenario: Scenario) -> Rig:
     )
     body = Body(**robot.model_dump())
     guard, safety = scenario.guard, scenario.safety
-    return make_rig(
+    return _latest_rig(
         body,
         all_round(sensor),
         Guarding(
@@ -74,6 +75,12 @@ def make_rig_of(scenario: Scenario) -> Rig:
         Safety(**safety.model_dump()),
         Sharing(exact_features=scenario.radio.exact_features),
     )
+
+
+@lru_cache(maxsize=1)
+def _latest_rig(body: Body, sensor: Sensor, guarding: Guarding, safety: Safety, sharing: Sharing) -> Rig:
+    """Return the rig of this data sheet; that of the last one asked for, whose tables take long, is kept."""
+    return make_rig(body, sensor, guarding, safety, sharing)
 
 
 def planner_of(chosen: PlannerModel) -> Planner:

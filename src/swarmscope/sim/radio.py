@@ -99,3 +99,12 @@ def throw(sim: Sim, tick: int, j: int, data: np.ndarray, length: int) -> bool:
     if sim.robots[j]["crashed"] or is_off_air(sim.robots[j], tick):
         return False
     return _queue(sim, j, STRANGER, tick * sim.clock.dt, data, length)
+
+
+@jit
+def throw_all(sim: Sim, tick: int, to: np.ndarray, data: np.ndarray, length: np.ndarray) -> int:
+    """Throw packets ``data`` (K, bytes) at robots ``to`` (K,), one after the other; return how many are heard."""
+    heard = 0
+    for k in range(to.size):
+        heard += throw(sim, tick, to[k], data[k], length[k])
+    return heard

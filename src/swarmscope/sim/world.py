@@ -8,6 +8,7 @@ thick with round ends and corners, so that a LiDAR sees from every side what a r
 from __future__ import annotations
 
 import math
+import operator
 from itertools import pairwise
 from typing import Annotated, Any, Literal, NamedTuple, Self
 
@@ -198,8 +199,28 @@ class World(NamedTuple):
     """Side of a cell [m]."""
 
 
+_LATEST: list[tuple[tuple[Any, ...], World]] = []
+"""What was compiled last, and its arrays: making and checking a place asks for the same ones several times."""
+
+
 def compile_world(spec: WorldSpec) -> World:
-    """Turn the description into arrays and look-up bins for the kernels."""
+    """Return the description as arrays and look-up bins for the kernels, to be read only."""
+    parts = (spec.bounds, *spec.obstacles)
+    for others, world in tuple(_LATEST):
+        if _are_same(parts, others):
+            return world
+    world = _compiled(spec)
+    _LATEST[:] = [(parts, world)]
+    return world
+
+
+def _are_same(parts: tuple[Any, ...], others: tuple[Any, ...]) -> bool:
+    """Tell whether two worlds consist of the very same parts, which do not change."""
+    return len(parts) == len(others) and all(map(operator.is_, parts, others))
+
+
+def _compiled(spec: WorldSpec) -> World:
+    """Turn the description into arrays and look-up bins."""
     walls = [np.asarray(o.points, dtype=np.float64) for o in spec.obstacles if isinstance(o, Wall)]
     circles = np.concatenate([_circle_rows(spec), *map(_joints, walls)])
     bars = [bar for wall in walls for a, b in pairwise(wall) for bar in _bars(a, b)]

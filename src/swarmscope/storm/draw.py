@@ -72,6 +72,8 @@ class Draw:
     """Whether it is run twice, to compare."""
     refused: Mapping[str, int] = field(default_factory=dict)
     """Draws before this one that were no possible runs, by the key that says so."""
+    setup: Setup | None = field(default=None, compare=False, repr=False)
+    """Its place, so that it need not be made and checked again."""
 
 
 def draw(seed: int, index: int, planners: Sequence[str], covered: bool = False) -> Draw | dict[str, int]:
@@ -89,12 +91,12 @@ def draw(seed: int, index: int, planners: Sequence[str], covered: bool = False) 
         if covered:
             _leave_out(values)
         try:
-            _check(values, where, rng)
+            setup = _check(values, where, rng)
         except (ConfigError, UnsolvableWorldError) as error:
             key = _key_of(error)
             refused[key] = refused.get(key, 0) + 1
             continue
-        return Draw(Case(values, forger), where, again, refused)
+        return Draw(Case(values, forger), where, again, refused, setup)
     return refused
 
 
@@ -162,8 +164,8 @@ def _set_each(values: dict[str, Any], rng: np.random.Generator, spans: Mapping[s
             set_path(values, key.split("."), round(drawn) if key in WHOLE else drawn, "storm")
 
 
-def _check(values: dict[str, Any], where: str, rng: np.random.Generator) -> None:
-    """Make the world of a run, cheap questions first. Errors: ConfigError, UnsolvableWorldError."""
+def _check(values: dict[str, Any], where: str, rng: np.random.Generator) -> Setup:
+    """Make and return the place of a run, cheap questions first. Errors: ConfigError, UnsolvableWorldError."""
     _check_sheet(values)
     if where in OWN_WORLDS:
         radius = values["robot"]["radius_m"]
@@ -174,6 +176,7 @@ def _check(values: dict[str, Any], where: str, rng: np.random.Generator) -> None
     scenario = parse_scenario(values, "storm")
     setup = make_setup(scenario)
     values["limit_s"] = _limit_s(scenario, setup)
+    return setup
 
 
 def _check_sheet(values: dict[str, Any]) -> None:

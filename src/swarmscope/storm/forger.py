@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections import deque
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from swarmscope._jit import jit_alloc
 from swarmscope.onboard.sharing.codes import put_checksum, put_u16
 from swarmscope.onboard.sharing.message import (
     KIND_LATENT,
@@ -22,12 +22,13 @@ from swarmscope.onboard.sharing.message import (
     is_request,
     name_of,
 )
-from swarmscope.sim.radio import throw
+from swarmscope.sim.radio import throw_all
 from swarmscope.sim.state import Sim
 
 KINDS = ("rubbish", "broken", "replayed", "forged", "answers")
 """Random bytes; what was heard, with flipped bits or cut; what was heard, now or long ago, to anybody; packets with a
 right checksum and anything in them; lies in answer to real requests, in the name of whom was asked or of anybody."""
+RUBBISH, BROKEN, REPLAYED, FORGED, ANSWERS = range(len(KINDS))
 REMEMBERED = 256
 """Packets that it can throw again."""
 LONG = 20.0
@@ -48,6 +49,23 @@ class Forger:
         return asdict(self) | {"kinds": list(self.kinds)}
 
 
+class Heard(NamedTuple):
+    """The newest packets that were on the air, a ring of `REMEMBERED`."""
+
+    sender: np.ndarray
+    asked: np.ndarray
+    """Whom each was for."""
+    length: np.ndarray
+    data: np.ndarray
+    total: np.ndarray
+    """(1,): how many there ever were."""
+
+
+def _nothing_heard() -> Heard:
+    sender, asked, length = (np.zeros(REMEMBERED, np.int64) for _ in range(3))
+    return Heard(sender, asked, length, np.zeros((REMEMBERED, MAX_PACKET_BYTES), np.uint8), np.zeros(1, np.int64))
+
+
 class Attack:
     """A forger at work in one run."""
 
@@ -55,83 +73,127 @@ class Attack:
         self.forger = forger
         self.thrown = 0
         self._rng = np.random.default_rng(forger.seed)
-        self._heard: deque[tuple[int, int, bytes]] = deque(maxlen=REMEMBERED)
+        self._kinds = np.array([KINDS.index(kind) for kind in forger.kinds])
+        self._heard = _nothing_heard()
 
     def strike(self, sim: Sim, tick: int) -> None:
         """Hear what is being sent, then throw."""
-        for i in np.flatnonzero(sim.decisions["n_out"]).tolist():
-            decision = sim.decisions[i]
-            for k in range(int(decision["n_out"])):
-                packet = decision["out"][k, : decision["out_length"][k]].tobytes()
-                if packet:
-                    self._heard.append((i, int(decision["out_to"][k]), packet))
-        for _ in range(int(self._rng.poisson(self.forger.per_tick))):
-            kind = self.forger.kinds[int(self._rng.integers(len(self.forger.kinds)))]
-            to, packet = self._packet(kind, sim)
-            data = np.zeros(MAX_PACKET_BYTES, np.uint8)
-            length = min(len(packet), MAX_PACKET_BYTES)
-            data[:length] = packet[:length]
-            self.thrown += int(throw(sim, tick, to, data, length))
+        to, length, data = prepare(
+            self._rng, float(self.forger.per_tick), self._kinds, sim.decisions, sim.percepts, self._heard
+        )
+        if to.size > 0:
+            self.thrown += throw_all(sim, tick, to, data, length)
 
-    def _packet(self, kind: str, sim: Sim) -> tuple[int, np.ndarray]:
-        """Return a packet and whom it is for."""
-        rng, robots = self._rng, sim.robots.size
-        to = int(rng.integers(robots))
-        if kind == "forged":
-            return to, self._forged(self._head(sim, to))
-        if kind == "rubbish" or not self._heard:
-            return to, rng.integers(0, 256, int(rng.integers(0, MAX_PACKET_BYTES + 1)), dtype=np.uint8)
-        sender, asked, packet = self._heard[int(rng.integers(len(self._heard)))]
-        data = np.frombuffer(packet, np.uint8).copy()
-        if kind == "answers" and is_request(int(data[0])):
-            boot, seq = int(data[3]) | int(data[4]) << 8, int(data[5]) | int(data[6]) << 8
-            head = self._head(sim, sender)._replace(reply_to=name_of(boot, seq))
-            if rng.random() < 0.7:
-                head = head._replace(sender=asked)
-            return sender, self._answer(head)
-        if kind == "broken":
-            for at in rng.integers(0, data.size, int(rng.integers(1, 5))):
-                data[at] ^= np.uint8(1 << int(rng.integers(8)))
-            if rng.random() < 0.3:
-                data = data[: int(rng.integers(0, data.size))]
-        return to if rng.random() < 0.5 else asked, data  # whom it was for may be nobody, who was made up
 
-    def _head(self, sim: Sim, to: int) -> Head:
-        """Return a header: of a robot with its real boot number, or of nobody."""
-        rng = self._rng
-        sender = int(rng.integers(sim.robots.size)) if rng.random() < 0.8 else int(rng.integers(65536))
-        sender = to if rng.random() < 0.05 else sender
-        known = sender < sim.robots.size and rng.random() < 0.7
-        boot = int(sim.percepts[sender]["boot"]) if known else int(rng.integers(65536))
-        return Head(sender, boot, int(rng.integers(65536)), int(rng.integers(65536)))
+@jit_alloc
+def prepare(
+    rng: np.random.Generator,
+    per_tick: float,
+    kinds: np.ndarray,
+    decisions: np.ndarray,
+    percepts: np.ndarray,
+    heard: Heard,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Hear what is being sent; return this tick's packets: whom they are for (K,), their lengths, their bytes.
 
-    def _forged(self, head: Head) -> np.ndarray:
-        """Return any packet with a right checksum."""
-        rng, out = self._rng, np.zeros(MAX_PACKET_BYTES, np.uint8)
-        kind = int(rng.integers(6))
-        if kind == 0:
-            return out[: encode_request(head, out)]
-        if kind == 1:
-            return out[: encode_directed_request(head, rng.uniform(-10.0, 10.0), out)]
-        if kind == 2:  # a right checksum under anything
-            out[:] = rng.integers(0, 256, MAX_PACKET_BYTES, dtype=np.uint8)
-            out[0] = (VERSION << 4) | int(rng.integers(KIND_LATENT + 2))
-            return out[: put_checksum(out, int(rng.integers(7, MAX_PACKET_BYTES - 1)))]
-        return self._answer(head)
+    Numba draws the same numbers from a generator as NumPy does (tests/storm/test_forger.py).
+    """
+    _hear(decisions, heard)
+    count = int(rng.poisson(per_tick))
+    to, length = np.zeros(count, np.int64), np.zeros(count, np.int64)
+    data = np.zeros((count, MAX_PACKET_BYTES), np.uint8)
+    for k in range(count):
+        kind = kinds[int(rng.integers(0, kinds.size))]
+        to[k], length[k] = _packet(rng, kind, percepts, heard, data[k])
+    return to, length, data
 
-    def _answer(self, head: Head) -> np.ndarray:
-        """Return an answer with lies in it."""
-        rng, out = self._rng, np.zeros(MAX_PACKET_BYTES, np.uint8)
-        kind, n = int(rng.integers(3)), int(rng.integers(MAX_FEATURES + 1))
-        if kind == 0:
-            codes = rng.integers(0, 256, 128, dtype=np.uint8)
-            return out[: encode_latent(head, codes, int(rng.integers(256)), out)]
-        if kind == 1:
-            angles, distances = rng.uniform(0.0, 7.0, n), rng.uniform(0.0, LONG, n)
-            return out[: encode_features(head, angles, distances, n, LONG, out)]
-        out[0] = (VERSION << 4) | 3  # exact features, of any bits: NaN, infinity, negative ones
-        for at, value in zip((1, 3, 5, 7), head, strict=True):
-            put_u16(out, at, value)
-        out[9] = n
-        out[10 : 10 + 8 * n] = rng.integers(0, 256, 8 * n, dtype=np.uint8)
-        return out[: put_checksum(out, 10 + 8 * n)]
+
+@jit_alloc
+def _hear(decisions: np.ndarray, heard: Heard) -> None:
+    """Keep what is being sent."""
+    for i in range(decisions.size):
+        decision = decisions[i]
+        for k in range(decision["n_out"]):
+            length = decision["out_length"][k]
+            if length <= 0:
+                continue
+            at = heard.total[0] % REMEMBERED
+            heard.sender[at], heard.asked[at], heard.length[at] = i, decision["out_to"][k], length
+            for b in range(length):
+                heard.data[at, b] = decision["out"][k, b]
+            heard.total[0] += 1
+
+
+@jit_alloc
+def _packet(
+    rng: np.random.Generator, kind: int, percepts: np.ndarray, heard: Heard, out: np.ndarray
+) -> tuple[int, int]:
+    """Write a packet into ``out``; return whom it is for and its length."""
+    to = int(rng.integers(0, percepts.size))
+    if kind == FORGED:
+        return to, _forged(rng, _head(rng, percepts, to), out)
+    known = min(REMEMBERED, heard.total[0])
+    if kind == RUBBISH or known == 0:
+        length = int(rng.integers(0, MAX_PACKET_BYTES + 1))
+        out[:length] = rng.integers(0, 256, length, np.uint8)
+        return to, length
+    at = (heard.total[0] - known + int(rng.integers(0, known))) % REMEMBERED
+    sender, asked, length, packet = heard.sender[at], heard.asked[at], heard.length[at], heard.data[at]
+    if kind == ANSWERS and is_request(int(packet[0])):
+        boot, seq = int(packet[3]) | int(packet[4]) << 8, int(packet[5]) | int(packet[6]) << 8
+        liar = _head(rng, percepts, sender)
+        name = asked if rng.random() < 0.7 else liar.sender
+        return sender, _answer(rng, Head(name, liar.boot, liar.seq, name_of(boot, seq)), out)
+    out[:length] = packet[:length]
+    if kind == BROKEN:
+        for at in rng.integers(0, length, int(rng.integers(1, 5))):
+            out[at] ^= np.uint8(1 << int(rng.integers(0, 8)))
+        if rng.random() < 0.3:
+            length = int(rng.integers(0, length))
+    return to if rng.random() < 0.5 else asked, length  # whom it was for may be nobody, who was made up
+
+
+@jit_alloc
+def _head(rng: np.random.Generator, percepts: np.ndarray, to: int) -> Head:
+    """Return a header: of a robot with its real boot number, or of nobody."""
+    robots = percepts.size
+    sender = int(rng.integers(0, robots)) if rng.random() < 0.8 else int(rng.integers(0, 65536))
+    sender = to if rng.random() < 0.05 else sender
+    known = sender < robots and rng.random() < 0.7
+    boot = int(percepts[sender]["boot"]) if known else int(rng.integers(0, 65536))
+    return Head(sender, boot, int(rng.integers(0, 65536)), int(rng.integers(0, 65536)))
+
+
+@jit_alloc
+def _forged(rng: np.random.Generator, head: Head, out: np.ndarray) -> int:
+    """Write any packet with a right checksum; return its length."""
+    kind = int(rng.integers(0, 6))
+    if kind == 0:
+        return encode_request(head, out)
+    if kind == 1:
+        return encode_directed_request(head, rng.uniform(-10.0, 10.0), out)
+    if kind == 2:  # a right checksum under anything
+        out[:] = rng.integers(0, 256, MAX_PACKET_BYTES, np.uint8)
+        out[0] = (VERSION << 4) | int(rng.integers(0, KIND_LATENT + 2))
+        return put_checksum(out, int(rng.integers(7, MAX_PACKET_BYTES - 1)))
+    return _answer(rng, head, out)
+
+
+@jit_alloc
+def _answer(rng: np.random.Generator, head: Head, out: np.ndarray) -> int:
+    """Write an answer with lies in it; return its length."""
+    kind, n = int(rng.integers(0, 3)), int(rng.integers(0, MAX_FEATURES + 1))
+    if kind == 0:
+        codes = rng.integers(0, 256, 128, np.uint8)
+        return encode_latent(head, codes, int(rng.integers(0, 256)), out)
+    if kind == 1:
+        angles, distances = rng.uniform(0.0, 7.0, n), rng.uniform(0.0, LONG, n)
+        return encode_features(head, angles, distances, n, LONG, out)
+    out[0] = (VERSION << 4) | 3  # exact features, of any bits: NaN, infinity, negative ones
+    put_u16(out, 1, head.sender)
+    put_u16(out, 3, head.boot)
+    put_u16(out, 5, head.seq)
+    put_u16(out, 7, head.reply_to)
+    out[9] = n
+    out[10 : 10 + 8 * n] = rng.integers(0, 256, 8 * n, np.uint8)
+    return put_checksum(out, 10 + 8 * n)

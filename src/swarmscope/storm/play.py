@@ -22,7 +22,7 @@ from swarmscope.sim.loop import Trace, run
 from swarmscope.storm.draw import Case, Draw, draw
 from swarmscope.storm.forger import Attack
 from swarmscope.storm.watch import Breach, Watch, reasons_of
-from swarmscope.tasks import task_file, task_names
+from swarmscope.tasks import Setup, task_file, task_names
 
 DIGESTED = ("x", "y", "yaw", "speed", "clearance", "state", "reason", "side", "bytes_sent")
 """Records that must be the same when a run is run again."""
@@ -41,10 +41,10 @@ class Played(NamedTuple):
     digest: str
 
 
-def play_case(case: Case, threads: int = 1) -> Played:
-    """Play a run and watch it. Errors: those of scenarios and of worlds."""
+def play_case(case: Case, threads: int = 1, setup: Setup | None = None) -> Played:
+    """Play a run, in its ``setup`` if that is known, and watch it. Errors: those of scenarios and of worlds."""
     scenario = parse_scenario(case.values, "storm")
-    setting = make_setting(scenario, make_setup(scenario), threads)
+    setting = make_setting(scenario, make_setup(scenario) if setup is None else setup, threads)
     attack = None if case.forger is None else Attack(case.forger)
     watch = Watch(setting, attack)
     trace = run(setting, between=watch)
@@ -61,11 +61,11 @@ def play_case(case: Case, threads: int = 1) -> Played:
     )
 
 
-def watched(case: Case, again: bool = False) -> Played:
+def watched(case: Case, again: bool = False, setup: Setup | None = None) -> Played:
     """Play a run, twice if ``again``; an exception in it is a breach, too, but for errors of scenarios and worlds."""
     try:
-        played = play_case(case)
-        if again and play_case(case, threads=2).digest != played.digest:
+        played = play_case(case, setup=setup)
+        if again and play_case(case, 2, setup).digest != played.digest:
             return played._replace(breach=Breach("bytes", 0, 0, "the same run gave other bytes with two threads"))
     except SwarmscopeError:
         raise
@@ -115,7 +115,7 @@ def play_job(job: str) -> str:
     row = answer | {"refused": drawn.refused, "where": drawn.where, "planner": values["planner"]["name"]}
     row["robots"] = values["robots"]
     try:
-        played = watched(drawn.case, drawn.again)
+        played = watched(drawn.case, drawn.again, drawn.setup)
     except SwarmscopeError as error:
         row["refused"] = {**drawn.refused, str(error)[:80]: 1}
         return json.dumps(answer | {"refused": row["refused"]})

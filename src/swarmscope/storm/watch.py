@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from swarmscope._jit import jit
 from swarmscope.onboard.reasons import STATE_NAMES
 from swarmscope.onboard.sharing.message import MAX_PACKET_BYTES
 from swarmscope.sim.loop import Setting, Trace
@@ -30,6 +31,67 @@ class Breach(NamedTuple):
     text: str
 
 
+class Allowed(NamedTuple):
+    """What a robot's data sheet and radio allow."""
+
+    dt: float
+    v_max: float
+    w_max: float
+    bitrate_bps: float
+    late_s: float
+    """Time on the air beyond the time that has passed: the longest wait and packet [s]."""
+
+
+def _allowed(setting: Setting) -> Allowed:
+    radio, body = setting.radio, setting.rig.body
+    longest = 8.0 * (MAX_PACKET_BYTES + radio.overhead_bytes) / radio.bitrate_bps
+    late = radio.max_wait_s + longest + SLACK
+    return Allowed(*map(float, (setting.dt, body.v_max_mps, body.w_max_radps, radio.bitrate_bps, late)))
+
+
+class Counts(NamedTuple):
+    """What is counted of a run, in ticks."""
+
+    on: np.ndarray
+    """(N,): in which each robot was switched on and had not arrived."""
+    under_way: np.ndarray
+    """(N,): the same up to the last one in which it drove."""
+    driving: np.ndarray
+    """(1,): in which they drove, of all robots together."""
+    drove: np.ndarray
+    """(1,): the last one in which one drove or was switched off."""
+
+
+def _no_counts(robots: int) -> Counts:
+    return Counts(*(np.zeros(size, np.int64) for size in (robots, robots, 1, 1)))
+
+
+@jit
+def look(robots: np.ndarray, decisions: np.ndarray, tick: int, may: Allowed, counts: Counts) -> bool:
+    """Count who is switched on and who drives; return whether something must not be, for `Watch` to say what.
+
+    Numbers that are none fail every comparison.
+    """
+    fine = True
+    there = tick * may.dt + may.late_s
+    for i in range(robots.size):
+        robot, v, w = robots[i], decisions[i]["v"], decisions[i]["w"]
+        if tick < robot["down_until"]:
+            counts.drove[0] = tick
+        elif robot["arrived"] == 0:
+            counts.on[i] += 1
+            if robot["v"] > MOVES_MPS:
+                counts.under_way[i] = counts.on[i]
+                counts.driving[0] += 1
+                counts.drove[0] = tick
+        placed = math.isfinite(robot["x"]) and math.isfinite(robot["y"]) and math.isfinite(robot["yaw"])
+        sound = robot["v"] >= -SLACK and robot["v"] <= may.v_max + SLACK and robot["clearance"] >= 0.0
+        obeys = v >= 0.0 and v <= may.v_max + SLACK and abs(w) <= may.w_max + SLACK
+        quiet = 8.0 * robot["air_bytes"] / may.bitrate_bps <= there
+        fine = fine and robot["crashed"] == 0 and placed and sound and obeys and quiet
+    return not fine
+
+
 class Watch:
     """Looks at a run between ticks; ``breach`` is the first one, with which the run ends."""
 
@@ -37,39 +99,29 @@ class Watch:
         self.breach: Breach | None = None
         self.attack = attack
         self._setting = setting
-        robots = len(setting.starts)
-        self._on = np.zeros(robots, np.int64)
-        self._under_way = np.zeros(robots, np.int64)
-        self._driving = 0
-        self._drove = 0
+        self._counts = _no_counts(len(setting.starts))
+        self._may = _allowed(setting)
 
     @property
     def under_way_s(self) -> float:
         """Seconds of all robots from the start to the last tick in which each drove, without those switched off."""
-        return float(self._under_way.sum()) * self._setting.dt
+        return float(self._counts.under_way.sum()) * self._setting.dt
 
     @property
     def driving_s(self) -> float:
         """Seconds in which they drove."""
-        return self._driving * self._setting.dt
+        return float(self._counts.driving[0]) * self._setting.dt
 
     def __call__(self, sim: Sim, tick: int) -> bool:
         """Check what was decided and what the tick before did; return whether the run ends."""
-        robots = sim.robots
-        on = (robots["arrived"] == 0) & (tick >= robots["down_until"])
-        moves = on & (robots["v"] > MOVES_MPS)
-        self._on += on
-        self._under_way[moves] = self._on[moves]
-        self._driving += int(moves.sum())
-        if moves.any() or (tick < robots["down_until"]).any():
-            self._drove = tick
-        found = self._contact(robots) or self._commands(sim) or self._state(robots) or self._radio(sim, tick)
+        odd = look(sim.robots, sim.decisions, tick, self._may, self._counts)
+        found = self._found(sim, tick) if odd else None
         if found is not None:
             self.breach = Breach(found[0], tick, found[1], found[2])
             return True
         if self.attack is not None:
             self.attack.strike(sim, tick)
-        return bool((tick - self._drove) * self._setting.dt >= STOOD_S)
+        return bool((tick - self._counts.drove[0]) * self._setting.dt >= STOOD_S)
 
     def finish(self, trace: Trace) -> None:
         """Check what the last tick did, and that whoever did not arrive says why."""
@@ -79,6 +131,11 @@ class Watch:
         found = self._contact(trace.robots) or self._state(trace.robots) or self._reasons(trace)
         if found is not None:
             self.breach = Breach(found[0], tick, found[1], found[2])
+
+    def _found(self, sim: Sim, tick: int) -> Found | None:
+        """Return the first thing that must not be, in words."""
+        robots = sim.robots
+        return self._contact(robots) or self._commands(sim) or self._state(robots) or self._radio(sim, tick)
 
     def _contact(self, robots: np.ndarray) -> Found | None:
         hit = np.flatnonzero(robots["crashed"])
@@ -116,8 +173,7 @@ class Watch:
     def _radio(self, sim: Sim, tick: int) -> Found | None:
         """No radio was on the air longer than there was time, and the longest wait and packet beyond."""
         radio = self._setting.radio
-        longest = 8.0 * (MAX_PACKET_BYTES + radio.overhead_bytes) / radio.bitrate_bps
-        there = tick * self._setting.dt + radio.max_wait_s + longest + SLACK
+        there = tick * self._setting.dt + self._may.late_s
         bad = np.flatnonzero(8.0 * sim.robots["air_bytes"] / radio.bitrate_bps > there)
         if not bad.size:
             return None

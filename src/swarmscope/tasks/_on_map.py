@@ -55,11 +55,10 @@ def _largest_part(raster: Raster) -> Ints:
     if label < 0:
         raise UnsolvableWorldError("the map has no free cell for a robot of this radius")
     rows = np.repeat(np.arange(raster.blocked.shape[0]), np.diff(found.row_first))
-    cells = [
-        np.column_stack([np.full(last - first, row), np.arange(first, last)])
-        for row, first, last in np.column_stack([rows, found.run_start, found.run_end])[found.label == label]
-    ]
-    return np.concatenate(cells)
+    ours = found.label == label
+    first, length = found.run_start[ours], (found.run_end - found.run_start)[ours]
+    within = np.arange(length.sum()) - np.repeat(np.cumsum(length) - length, length)
+    return np.column_stack([np.repeat(rows[ours], length), np.repeat(first, length) + within])
 
 
 def _goal_for(robot: int, start: Floats, goals: _Scatter, searcher: Searcher, min_distance: float) -> Floats:

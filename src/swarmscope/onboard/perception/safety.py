@@ -55,7 +55,11 @@ def reach_table(increment: float, range_max: float, footprint: float, rule: Rule
     table = np.empty(BINS + 2, np.int16)
     table[BINS] = 0
     table[BORDER] = math.ceil(max(rule.half_alpha, UNSEEN_HALF_ANGLE) / increment - 1e-6)
+    table[:BINS] = -1
+    blocking = max(rule.l_th, rule.look_ahead)
     for k in range(BINS):
+        if k * range_max / BINS >= blocking:
+            break  # and nothing beyond
         half = blocking_half_angle(k * range_max / BINS, footprint, rule)
         table[k] = math.ceil(half / increment - 1e-6) if half > 0.0 else -1
         if half > 0.0:
