@@ -137,6 +137,7 @@ def _check_view(rig: Rig, speed: float, need: float, what: str, width: float, ne
 
 def _least_beams(sensor: Sensor, finest: float) -> int:
     """Return how many beams over the same view are no more than ``finest`` [rad] apart."""
-    if sensor.field == 0:
-        return math.ceil(sensor.increment * sensor.beams / finest)
-    return 1 + math.ceil(sensor.increment * (sensor.field - 1) / finest)
+    whole = sensor.increment * sensor.beams
+    if sensor.field == 0 and whole <= 2.0 * math.pi * (1.0 + 1e-9):
+        return math.ceil(whole / finest)
+    return 1 + math.ceil(sensor.increment * ((sensor.field or sensor.beams) - 1) / finest)
