@@ -100,6 +100,27 @@ def test_a_scan_that_is_invalid_throughout_leaves_no_direction():
     assert not seen.safe[0].any() and seen.safe[1].all()
 
 
+@pytest.mark.parametrize("beams", [(10, 85, 160, 230, 310), (180,)])
+@pytest.mark.parametrize("walls_m", [math.inf, 4.0])
+def test_single_broken_readings_close_no_direction_and_are_counted(beams, walls_m):
+    """In the open and in a round room: once five of 360 that were no number left no direction at all."""
+    whole = np.full(360, walls_m, np.float32)
+    torn = whole.copy()
+    torn[list(beams)] = np.nan
+    seen = perceive(log_of(np.stack([whole, torn])))
+    assert seen.safe.all()
+    assert seen.broken.tolist() == [0, len(beams)]
+    assert len(seen.features[1]) == len(seen.features[0])
+
+
+def test_a_hole_in_which_a_body_fits_closes_its_directions():
+    torn = np.full(360, np.inf, np.float32)
+    torn[120:240] = np.nan
+    seen = perceive(log_of(torn))
+    assert not seen.safe[0, 120:240].any() and seen.safe[0, :25].all()
+    assert seen.broken.tolist() == [120]
+
+
 def test_the_log_itself_is_not_changed(forest_scans):
     log = log_of(forest_scans)
     before = log.ranges_m.copy()

@@ -133,13 +133,33 @@ def test_contacts_between_robots_are_those_of_the_exact_motion(pace):
     assert 20 < touching < judged_cases - 20
 
 
-@pytest.mark.parametrize(("rate", "v"), [(1.0, 2.0), (2.0, 2.0), (3.0, 2.0), (5.0, 2.0), (5.0, 5.0), (1.0, 5.0)])
+@pytest.mark.parametrize(
+    ("rate", "v"), [(1.0, 2.0), (2.0, 2.0), (3.0, 2.0), (5.0, 2.0), (5.0, 3.0), (5.0, 5.0), (1.0, 5.0)]
+)
 def test_nobody_drives_through_another_within_one_tick(rate, v):
     for apart in np.arange(0.35, 2.0 * v / rate + 0.3, 0.05):
         starts = [(-0.5 * apart, 0.0, 0.0), (0.5 * apart, 0.0, math.pi)]
         sim = judged(starts, [v, v], [(v, 0.0)] * 2, (v, rate, 2.0), 2.0)
         meets = 2.0 * v / rate > apart - 2.0 * RADIUS
         assert sim.robots["crashed"].tolist() == [int(meets)] * 2, apart
+
+
+@pytest.mark.parametrize(
+    ("rate", "v", "w"),
+    [(1.0, 2.0, 2.0), (2.0, 1.0, 2.0), (2.0, 2.0, 2.0), (3.0, 2.0, 2.0), (5.0, 2.0, 6.0), (5.0, 0.5, 2.0)],
+)
+def test_an_arc_that_grazes_a_post_is_a_contact(rate, v, w):
+    """Posts of 10 cm all along an arc and beside it: once its chords were clear of some that the arc hit."""
+    pace, path = (v, rate, w), exact_path(np.zeros(3), v, v, w, 2.0, 1.0 / rate)
+    grazed = 0
+    for x in np.linspace(0.0, v / rate, 11):
+        for y in np.linspace(-1.2, 1.2, 25):
+            gap = float(np.hypot(path[:, 0] - x, path[:, 1] - y).min()) - RADIUS - 0.05
+            if gap < -off_by(rate, w) and math.hypot(x, y) > 0.22:
+                sim = judged([(0.0, 0.0, 0.0)], [v], [(v, w)], pace, 2.0, circle(float(x), float(y), 0.05))
+                assert sim.robots["crashed"].tolist() == [1], (x, y, gap)
+                grazed += 1
+    assert grazed > 0
 
 
 def test_who_was_stopped_stands_in_the_way_of_the_third():

@@ -41,6 +41,8 @@ def _print_table(log: ScanLog, seen: Perception) -> None:
     table.add_row("scans", f"{scans}")
     table.add_row("beams of a scan", f"{beams} over {fov:.0f} degrees")
     table.add_row("range used", f"{seen.rig.sensor.range_max:g} m")
+    if seen.broken.any():
+        table.add_row("broken readings, mean per scan", f"{seen.broken.mean():.1f}, bridged where no body fits")
     table.add_row("safe directions, mean per scan", f"{safe.mean():.1f} of {beams}")
     table.add_row("scans without any", f"{int((safe == 0).sum())}")
     table.add_row("features, mean and most", f"{found.mean():.1f}, {found.max()}")

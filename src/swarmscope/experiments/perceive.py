@@ -12,6 +12,7 @@ import numpy as np
 from swarmscope._jit import jit
 from swarmscope.errors import ConfigError, InputFileError
 from swarmscope.onboard.body import Body
+from swarmscope.onboard.perception.mend import mend
 from swarmscope.onboard.perception.safety import safe_directions
 from swarmscope.onboard.rig import AHEAD, Rig, make_rig
 from swarmscope.onboard.sensor import Sensor
@@ -32,6 +33,8 @@ class Perception:
     """Beam directions (M,) [rad], sensor frame."""
     ranges_m: np.ndarray
     """(K, M), +inf beyond the range that the robot uses."""
+    broken: np.ndarray
+    """(K,) readings that were none: NaN, or too near to be of something else."""
     safe: np.ndarray
     """(K, M) bool."""
     filtered_m: np.ndarray
@@ -59,7 +62,7 @@ def perceive(log: ScanLog, range_m: float = 5.0, radius_m: float = 0.15, beam_st
     rig = _rig_of(log, ranges.shape[1], log.increment * beam_step, range_m, radius_m)
     ranges[ranges > rig.sensor.range_max] = np.inf
     scans, beams = ranges.shape
-    safe = np.zeros((scans, beams), bool)
+    broken, safe = np.zeros(scans, int), np.zeros((scans, beams), bool)
     filtered = np.zeros((scans, beams), np.float32)
     found: list[np.ndarray] = []
     sizes, times = np.zeros(scans, int), np.zeros(scans)
@@ -68,6 +71,7 @@ def perceive(log: ScanLog, range_m: float = 5.0, radius_m: float = 0.15, beam_st
     perceive_repeatedly(1, swarm)  # loads the kernels
     for k in range(scans):
         swarm.masked[0] = ranges[k]
+        broken[k] = mend(swarm.masked[0], rig, swarm.safe[0])
         start = time.perf_counter_ns()
         count = perceive_repeatedly(REPEATS, swarm)
         times[k] = (time.perf_counter_ns() - start) / 1e3 / REPEATS
@@ -76,7 +80,7 @@ def perceive(log: ScanLog, range_m: float = 5.0, radius_m: float = 0.15, beam_st
         found.append(np.column_stack([(angles + np.pi) % (2 * np.pi) - np.pi, distances]))
         sizes[k] = encode_features(Head(0, 0, 0, 0), angles, distances, count, rig.sensor.range_max, packet)
     directions = rig.sensor.angle_min + rig.sensor.increment * np.arange(beams)
-    return Perception(rig, directions, ranges, safe, filtered, found, sizes, times)
+    return Perception(rig, directions, ranges, broken, safe, filtered, found, sizes, times)
 
 
 @jit

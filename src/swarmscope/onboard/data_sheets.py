@@ -13,7 +13,7 @@ from swarmscope.onboard.lidar import Lidar, finite, sensor_of
 from swarmscope.onboard.planners import Planner, load_planner
 from swarmscope.onboard.rig import GUARDING, SAFETY, SHARING, Guarding, Rig, Safety, Sharing, make_rig
 from swarmscope.onboard.scans import Scans
-from swarmscope.onboard.sensor import all_round
+from swarmscope.onboard.sensor import Sensor, all_round
 
 DEFAULTS: dict[str, Any] = {**GUARDING._asdict(), **SAFETY._asdict(), **SHARING._asdict()}
 """Options of a robot, by the keys of a scenario."""
@@ -131,5 +131,13 @@ def _check_view(rig: Rig, speed: float, need: float, what: str, width: float, ne
         raise ConfigError("lidar.range_m", f"{why}; {rig.sensor.range_max:g} m is too short")
     finest = 2.0 * math.asin(min(1.0, 0.5 * width / (need + nearer))) if width > 0.0 else math.pi
     if rig.sensor.increment > finest:
-        field = rig.sensor.increment * rig.sensor.beams
-        raise ConfigError("lidar.beams", f"{why}; {rig.sensor.beams} are too few, {math.ceil(field / finest)} would do")
+        count, least = rig.sensor.field or rig.sensor.beams, _least_beams(rig.sensor, finest)
+        raise ConfigError("lidar.beams", f"{why}; {count} are too few, {least} would do")
+
+
+def _least_beams(sensor: Sensor, finest: float) -> int:
+    """Return how many beams over the same view are no more than ``finest`` [rad] apart."""
+    whole = sensor.increment * sensor.beams
+    if sensor.field == 0 and whole <= 2.0 * math.pi * (1.0 + 1e-9):
+        return math.ceil(whole / finest)
+    return 1 + math.ceil(sensor.increment * ((sensor.field or sensor.beams) - 1) / finest)

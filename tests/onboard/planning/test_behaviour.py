@@ -103,13 +103,27 @@ def test_a_standing_robot_in_a_corridor_is_passed():
     arrive([(0, 0, 0), (-4, 0, 0)], [(0, 0), (4, 0)], tube(1.6), stretch=1.2)
 
 
+PARKED = [(0, 0, 0), (-3, 0.5, 0)], [(0, 0), (3, 0)]
+"""Robot 0 stands at its goal in the door through which robot 1 has to go."""
+
+
+def test_who_cannot_pass_a_door_in_which_another_has_parked_touches_nobody():
+    trace = run_scenario(place_scenario(*PARKED, door(0.7)))
+    assert trace.robots["arrived"].tolist() == [1, 0]
+    assert not trace.robots["crashed"].any()
+
+
+def test_a_door_in_which_another_has_parked_is_left_for_a_second_one():
+    """0.7 m wide, 2 m beside it."""
+    second = [wall((0, 0.35), (0, 4)), wall((0, -0.35), (0, -1.7)), wall((0, -2.4), (0, -4)), ROOM]
+    arrive(*PARKED, second)
+
+
 def test_two_robots_head_on_in_a_corridor():
     arrive([(-3, 0, 0), (3, 0, math.pi)], [(3, 0), (-3, 0)], tube(1.2), stretch=1.5)
 
 
-@pytest.mark.parametrize(
-    "obstacle", [wall((-3, 0.17), (2, 0.17)), wall((0.17, -1), (0.17, 1)), circle(0.46, 0.1, 0.3)]
-)
+@pytest.mark.parametrize("obstacle", [wall((-3, 0.17), (2, 0.17)), wall((0.17, -1), (0.17, 1)), circle(0.46, 0.1, 0.3)])
 def test_a_start_closer_than_the_margin_to_something(obstacle):
     arrive([(0, 0, 0)], [(3, 0)], [obstacle], stretch=2.5)
 
