@@ -11,7 +11,7 @@ from swarmscope.storm.draw import Case
 from swarmscope.storm.play import watched
 
 FOUND = Path(__file__).parent / "found"
-STUCK = "beams are 4.4 degrees apart, and stuck ones side by side hide a wall's end until it is too near"
+STUCK = "two stuck beams side by side look at a wall's end, and what was seen there is kept for a second only"
 OPEN = {"stuck_beams_before_a_wall_end": STUCK}
 """What still touches something, and why."""
 LONGER = 3.0

@@ -14,6 +14,8 @@ from swarmscope.onboard.perception.mend import mend
 from swarmscope.onboard.sensor import all_round
 from swarmscope.onboard.sharing.tracks import update_odometry, update_tracks
 
+BRIDGED = 1.0 - 0.5 * math.radians(1.0)
+"""A hole of one beam may hold a corner that stands out so far."""
 AHEAD = 180
 """The beam straight ahead; beams are 1 degree apart."""
 
@@ -80,11 +82,36 @@ def test_it_is_moved_by_odometry():
     assert after(scan_of(at_5=2.0), scan_of(), (0.0, 0.0, math.radians(10.0))) == {355: 2.0}  # past the circle's end
 
 
-@pytest.mark.parametrize("beside", [-1, 0, 1])
 @pytest.mark.parametrize("distance", [0.5, 4.0])
-def test_a_beam_that_passes_it_or_something_nearer_ends_it(beside, distance):
-    other = {f"at_{AHEAD + beside}": distance}
-    assert after(scan_of(at_180=2.0), scan_of(**other)) == {AHEAD + beside: distance}
+def test_a_beam_through_it_or_something_nearer_there_ends_it(distance):
+    assert after(scan_of(at_180=2.0), scan_of(at_180=distance)) == {AHEAD: distance}
+
+
+@pytest.mark.parametrize("beside", [-1, 1])
+def test_a_beam_beside_it_proves_nothing(beside):
+    """A wall's end of 2 cm may lie between the two."""
+    kept = {AHEAD: 2.0, AHEAD + beside: 4.0}
+    assert after(scan_of(at_180=2.0), scan_of(**{f"at_{AHEAD + beside}": 4.0})) == kept
+
+
+def test_between_two_beams_the_one_that_does_not_see_it_keeps_it_unless_the_other_does():
+    """After a turn by 0.4 degrees it lies between beams 179 and 180."""
+    turned = (0.0, 0.0, math.radians(0.4))
+    before = scan_of(at_180=2.0)
+    assert after(before, scan_of(at_180=4.0), turned) == {179: 2.0, 180: 4.0}
+    assert after(before, scan_of(at_179=4.0), turned) == {179: 4.0, 180: 2.0}
+    assert after(before, scan_of(at_179=4.0, at_180=4.0), turned) == {179: 4.0, 180: 4.0}
+    assert after(before, scan_of(at_179=2.05), turned) == {179: 2.05}
+    assert after(before, scan_of(at_179=1.0), turned) == {179: 1.0}
+
+
+def test_what_is_near_is_found_again_where_it_has_gone_in_a_step():
+    """0.5 m beside the robot, which drives 0.2 m: 22 degrees farther behind; all other beams see a wall."""
+    wall = np.full(360, 3.0, np.float32)
+    thing, gap = wall.copy(), wall.copy()
+    thing[90] = 0.5
+    gap[67:70] = np.inf
+    assert after(thing, gap, (0.2, 0.0, 0.0))[68] == pytest.approx(math.hypot(0.5, 0.2))
 
 
 def test_two_beams_beside_it_end_nothing():
@@ -127,14 +154,15 @@ def test_what_leaves_a_limited_view_is_not_lost():
     assert returns(view.scan) == {160: 2.0}
 
 
-def test_the_share_of_losses_is_remembered():
-    """Three of four returns are lost once; then they are there again, then all four are lost."""
+def test_the_share_of_losses_is_remembered_but_for_two_that_slip_between_beams():
+    """Five of six returns are lost once, which counts as three; then they are there again, then all six are lost."""
     rows = one_robot()
-    four = scan_of(at_10=2.0, at_100=2.0, at_190=2.0, at_280=2.0)
-    given(rows, four)
+    places = ("at_10", "at_60", "at_100", "at_190", "at_240", "at_280")
+    six = scan_of(**dict.fromkeys(places, 2.0))
+    given(rows, six)
     given(rows, scan_of(at_10=2.0))
     assert rows.shared["losses"] == pytest.approx(0.1 * 3 / 4)
-    given(rows, four)
+    given(rows, six)
     assert rows.shared["losses"] == pytest.approx(MEMORY * 0.075)
     given(rows, scan_of())
     assert rows.shared["losses"] == pytest.approx(MEMORY * MEMORY * 0.075 + 0.1)
@@ -142,14 +170,21 @@ def test_the_share_of_losses_is_remembered():
 
 def test_a_lidar_that_goes_blind_is_noticed_until_it_sees_again():
     rows = one_robot()
-    given(rows, scan_of(at_180=2.0))
+    given(rows, scan_of(at_100=2.0, at_180=2.0, at_260=2.0))
     blind = []
-    for _ in range(8):  # longer than the return itself is kept
+    for _ in range(8):  # longer than the returns themselves are kept
         given(rows, scan_of())
         blind.append(float(rows.shared["blind_s"]))
     assert blind == pytest.approx(DT * np.arange(1, 9))
     given(rows, scan_of(at_20=4.0))
     assert rows.shared["blind_s"] == 0.0
+
+
+def test_one_return_that_slips_between_two_beams_is_not_blindness():
+    rows = one_robot()
+    given(rows, scan_of(at_180=2.0))
+    given(rows, scan_of())
+    assert (rows.shared["blind_s"], rows.shared["losses"]) == (0.0, 0.0)
 
 
 def test_an_open_place_is_not_blindness():
@@ -177,7 +212,7 @@ def test_a_broken_beam_has_not_passed_the_place_where_something_was():
     for _ in range(3):
         assert given(rows, torn)[AHEAD] == np.float32(0.5)
     assert given(rows, np.full(360, 3.0, np.float32))[AHEAD] == np.float32(3.0)
-    assert given(rows, torn)[AHEAD] == np.float32(3.0)
+    assert given(rows, torn)[AHEAD] == pytest.approx(BRIDGED * 3.0)
     assert rows.shared["losses"] == 0.0
 
 
@@ -185,6 +220,6 @@ def test_what_a_hole_was_bridged_with_is_not_kept():
     torn = np.full(360, 3.0, np.float32)
     torn[AHEAD], torn[AHEAD + 1] = np.nan, 1.0
     rows = one_robot()
-    assert given(rows, torn)[AHEAD] == np.float32(1.0)
+    assert given(rows, torn)[AHEAD] == pytest.approx(BRIDGED * 1.0)
     torn[AHEAD + 1] = 3.0
-    assert given(rows, torn)[AHEAD] == np.float32(3.0)
+    assert given(rows, torn)[AHEAD] == pytest.approx(BRIDGED * 3.0)

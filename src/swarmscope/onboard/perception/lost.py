@@ -1,14 +1,15 @@
 """Returns that were there a moment ago: a beam that says nothing has not shown that their place is free.
 
-What stood within range and gives no return now, though nothing nearer hides it and no beam has passed its place, is
-kept where it was, moved by odometry, for ``Guarding.lost_s``. A LiDAR that loses too much is noticed.
+What stood within range is kept where it was, moved by odometry, for ``Guarding.lost_s``, where one of the two beams on
+either side of the place now says nothing or is broken, and the other one does not show it. A LiDAR that loses too much
+is noticed.
 """
 
 from __future__ import annotations
 
 import math
 
-from swarmscope._jit import jit, jit_inner
+from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.onboard.percept import Row
 from swarmscope.onboard.perception.frames import in_view
 from swarmscope.onboard.perception.mend import least_range
@@ -17,8 +18,13 @@ from swarmscope.onboard.view import View
 
 WITHIN = 0.9
 """Returns beyond this share of the range are not kept: they leave it by themselves."""
+SAME_M = 0.1
+"""A return that is farther than another by no more than this may be of the same thing."""
+THROUGH = 0.1
+"""A beam that is off a place by less than this part of the way to the next has looked there."""
 MEMORY = 0.9
 """What stays of the share of lost returns from tick to tick."""
+SLIPS = 2
 MOST_TICKS = 255
 
 
@@ -27,7 +33,7 @@ def keep_lost(see: View, broken: int) -> None:
     """Write what was lost since the last scan back into ``see.scan``; keep that scan in ``see.kept``.
 
     So many beams are ``broken``, 1 in ``see.safe``: where they look, what was seen there stays, however they are
-    bridged. ``see.filtered`` and ``see.narrow`` are scratch.
+    bridged. ``see.edges``, ``see.filtered`` and ``see.narrow`` are scratch.
     """
     rig, percept = see.rig, see.percept
     seen = 0
@@ -55,24 +61,25 @@ def _find_lost(see: View, most: int) -> tuple[int, bool]:
     rig = see.rig
     total, least, far = rig.sensor.beams, least_range(rig), WITHIN * rig.sensor.range_max
     turned = int(math.floor(see.percept["odom_yaw"] / rig.sensor.increment + 0.5))
+    moved = math.sqrt(see.percept["odom_x"] ** 2 + see.percept["odom_y"] ** 2)
+    _count_silent(see)
     lost, found = 0, False
     for n in range(total):
         if not least <= see.kept[n] < far or see.unseen[n] >= most:
             continue
-        m = n - turned
-        if rig.sensor.wraps:
-            m %= total
-        if 0 <= m < total and see.scan[m] < rig.sensor.range_max and not see.safe[m]:
+        m = (n - turned) % total
+        aside = 2 + int(1.6 * moved / (see.kept[n] * rig.sensor.increment))  # 1.6 > asin(x) / x
+        low, high = m - aside, m + aside
+        if low >= 0 and high < total and see.edges[high + 1] == see.edges[low]:
             continue
-        x, y, m = _now_at(see, n)
-        if not _is_lost(see, x, y, m):
+        x, y, m = _place_of(see, n)
+        if m < 0:
             continue
         if not found:
             for k in range(total):
                 see.filtered[k] = math.inf
         found = True
-        m %= total
-        lost += not see.safe[m]
+        lost += not see.safe[m] and _alone(see, m)
         distance = math.sqrt(x * x + y * y)
         if distance < see.filtered[m]:
             see.filtered[m], see.narrow[m] = distance, see.unseen[n] + 1
@@ -80,39 +87,74 @@ def _find_lost(see: View, most: int) -> tuple[int, bool]:
 
 
 @jit_inner
-def _now_at(see: View, n: int) -> tuple[float, float, int]:
-    """Return where the return of beam n of the last scan is now, body frame [m], and the beam that looks there."""
-    rig, percept = see.rig, see.percept
-    c, s = math.cos(percept["odom_yaw"]), math.sin(percept["odom_yaw"])
-    x, y = see.kept[n] * rig.cos[n] - percept["odom_x"], see.kept[n] * rig.sin[n] - percept["odom_y"]
-    px, py = c * x + s * y, c * y - s * x
-    return px, py, int(math.floor((math.atan2(py, px) - rig.sensor.angle_min) / rig.sensor.increment + 0.5))
+def _count_silent(see: View) -> None:
+    """Write into ``see.edges`` how many beams before each have no sound return."""
+    count = 0
+    for n in range(see.rig.sensor.beams):
+        see.edges[n] = count
+        count += not _sees(see, n)
+    see.edges[see.rig.sensor.beams] = count
+
+
+@jit_inline
+def _sees(see: View, k: int) -> bool:
+    """Tell whether beam k has a sound return."""
+    return bool(see.scan[k] < see.rig.sensor.range_max and not see.safe[k])
 
 
 @jit_inner
-def _is_lost(see: View, x: float, y: float, m: int) -> bool:
-    """Tell whether a return at (x, y), at which beam m looks, is lost: beam m is broken, or it and both beside it say
-    that nothing is there."""
+def _place_of(see: View, n: int) -> tuple[float, float, int]:
+    """Return where the return of beam n of the last scan is now, body frame [m], and the beam that has lost it.
+
+    -1 instead of the beam when none has: it is seen, hidden or passed, may have been a neighbour, or is out of view.
+    """
+    rig, percept, total = see.rig, see.percept, see.rig.sensor.beams
+    c, s = math.cos(percept["odom_yaw"]), math.sin(percept["odom_yaw"])
+    x, y = see.kept[n] * rig.cos[n] - percept["odom_x"], see.kept[n] * rig.sin[n] - percept["odom_y"]
+    x, y = c * x + s * y, c * y - s * x
+    distance = math.sqrt(x * x + y * y)
+    between = (math.atan2(y, x) - rig.sensor.angle_min) / rig.sensor.increment
+    low = int(math.floor(between))
+    first = low + 1 if between - low > 0.5 else low  # the nearer of the two goes first
+    lost_by = -1
+    for beam in (2 * low + 1 - first, first):
+        k = beam % total if rig.sensor.wraps else beam
+        if not 0 <= k < total:
+            return x, y, -1
+        if not _sees(see, k):
+            lost_by = k
+        elif see.scan[k] < distance + SAME_M or abs(between - beam) < THROUGH:
+            return x, y, -1
+    if lost_by < 0 or not distance >= least_range(rig) or (rig.sensor.field > 0 and not in_view(x, y, see)):
+        return x, y, -1
+    if near_track(percept, see.shared, x, y, rig):
+        return x, y, -1
+    return x, y, lost_by
+
+
+@jit_inner
+def _alone(see: View, m: int) -> bool:
+    """Tell whether the beams beside beam m say nothing either: at the edge of a thing beams lose it by rights."""
     rig, total = see.rig, see.rig.sensor.beams
-    if not rig.sensor.wraps and not 0 <= m < total:
-        return False
-    if not see.safe[m % total]:
-        for beside in range(m - 1, m + 2):
-            k = beside % total if rig.sensor.wraps else beside
-            if not 0 <= k < total or (see.scan[k] < rig.sensor.range_max and not see.safe[k]):
-                return False
-    if rig.sensor.field > 0 and not in_view(x, y, see):
-        return False
-    far_enough = x * x + y * y >= least_range(rig) ** 2
-    return bool(far_enough and not near_track(see.percept, see.shared, x, y, rig))
+    for k in (m - 1, m + 1):
+        if rig.sensor.wraps:
+            k %= total
+        if not 0 <= k < total or _sees(see, k):
+            return False
+    return True
 
 
 @jit_inner
 def _note_losses(percept: Row, shared: Row, seen: int, lost: int) -> None:
-    """Keep up how many returns are lost, and since when nothing is seen at all where something was."""
+    """Keep up how many returns are lost, and since when nothing is seen at all where something was.
+
+    One or two are no sign of a fault: what is narrow slips between two beams.
+    """
+    lost = max(0, lost - SLIPS)
     if seen > 0:
         shared["blind_s"] = 0.0
     elif lost > 0 or shared["blind_s"] > 0.0:
         shared["blind_s"] += percept["dt_s"]
-    if seen + lost > 0:
-        shared["losses"] = MEMORY * shared["losses"] + (1.0 - MEMORY) * lost / (seen + lost)
+    shared["losses"] *= MEMORY
+    if lost > 0:
+        shared["losses"] += (1.0 - MEMORY) * lost / (seen + lost)

@@ -31,8 +31,8 @@ def mend(ranges: np.ndarray, rig: Rig, broken: np.ndarray) -> int:
 
     ``broken (M,)`` uint8 becomes 1 for each of them, 0 for the others.
 
-    A run of them becomes as near as the nearer of the two readings beside it, and never farther than a body in
-    the hole could be; with nothing sound beside it, it is what touches the body.
+    A run of them becomes as near as the nearer of the two readings beside it, less what a corner may stand out there,
+    and never farther than a body in the hole could be; with nothing sound beside it, it is what touches the body.
     """
     least = least_range(rig)
     count = 0
@@ -81,4 +81,5 @@ def _behind(ranges: np.ndarray, k: int, stop: int, rig: Rig) -> float:
         return touching  # beyond the body something may stand too near to be measured
     fits = rig.body.radius_m / math.sin(0.5 * width) - rig.body.radius_m
     beside = min(float(ranges[(k - 1) % total]), float(ranges[stop % total]))
-    return max(touching, min(fits, beside))
+    corner = beside * (1.0 - 0.5 * (stop - k) * rig.sensor.increment)  # of a right angle, in the hole
+    return max(touching, min(fits, corner))
