@@ -19,6 +19,9 @@ from swarmscope.onboard.sharing.message import HEADER_FIELDS, MAX_FEATURES
 
 FEWEST_FRAMES, FRAMES_PER_TURN = 6, 2.7
 """Scans that are kept where the view is limited: so many times as many as fill the circle."""
+GUARD_ALONE = 128
+"""Added to ``View.unseen`` where a beam may have lost a return by rights, at the edge of a thing that the next beam
+sees: planners would give every edge a wider berth."""
 POSE = 5
 """Numbers that say where a scan was taken."""
 
@@ -47,7 +50,7 @@ class View(NamedTuple):
     kept: np.ndarray
     """(M,) float32: the scan of the last tick with what it had lost; 0 = there was none."""
     unseen: np.ndarray
-    """(M,) uint8: for how many ticks what is kept there has not been seen."""
+    """(M,) uint8: for how many ticks what is kept there has not been seen; plus GUARD_ALONE: for the guard only."""
     frames: Frames
     masked: np.ndarray
     """(M,) float32: the scan without moving neighbours."""

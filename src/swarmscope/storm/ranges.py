@@ -6,6 +6,7 @@ things in nearly every run) and ``noise.scan_age_s`` (turning between scan and d
 
 from __future__ import annotations
 
+import math
 from typing import Final, NamedTuple
 
 
@@ -119,6 +120,10 @@ STOOD_S: Final = 60.0
 TRIES: Final = 400
 """Draws before a number is given up."""
 
-OPEN: Final[dict[str, Span | None]] = {"noise.stuck": None}
+OPEN: Final[dict[str, Span | None]] = {
+    "noise.stuck": None,
+    "robot.a_max_mps2": Span(1.0, math.inf),
+    "lidar.rate_hz": Span(4.0, math.inf),
+}
 """Keys with which storms have found contacts (docs/storms.md), and the span in which they have not; None: the default
 only. ``--covered`` keeps what is drawn within these."""

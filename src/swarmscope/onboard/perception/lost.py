@@ -13,8 +13,8 @@ from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.onboard.percept import Row
 from swarmscope.onboard.perception.frames import in_view
 from swarmscope.onboard.perception.mend import least_range
-from swarmscope.onboard.sharing.tracks import near_track
-from swarmscope.onboard.view import View
+from swarmscope.onboard.sharing.tracks import was_near_track
+from swarmscope.onboard.view import GUARD_ALONE, View
 
 WITHIN = 0.9
 """Returns beyond this share of the range are not kept: they leave it by themselves."""
@@ -25,7 +25,7 @@ THROUGH = 0.1
 MEMORY = 0.9
 """What stays of the share of lost returns from tick to tick."""
 SLIPS = 2
-MOST_TICKS = 255
+MOST_TICKS = GUARD_ALONE - 1
 
 
 @jit
@@ -65,7 +65,7 @@ def _find_lost(see: View, most: int) -> tuple[int, bool]:
     _count_silent(see)
     lost, found = 0, False
     for n in range(total):
-        if not least <= see.kept[n] < far or see.unseen[n] >= most:
+        if not least <= see.kept[n] < far or (see.unseen[n] & MOST_TICKS) >= most:
             continue
         m = (n - turned) % total
         aside = 2 + int(1.6 * moved / (see.kept[n] * rig.sensor.increment))  # 1.6 > asin(x) / x
@@ -79,10 +79,12 @@ def _find_lost(see: View, most: int) -> tuple[int, bool]:
             for k in range(total):
                 see.filtered[k] = math.inf
         found = True
-        lost += not see.safe[m] and _alone(see, m)
+        by_rights = not (see.safe[m] or _alone(see, m))
+        lost += not (see.safe[m] or by_rights)
         distance = math.sqrt(x * x + y * y)
         if distance < see.filtered[m]:
-            see.filtered[m], see.narrow[m] = distance, see.unseen[n] + 1
+            see.filtered[m] = distance
+            see.narrow[m] = (see.unseen[n] & MOST_TICKS) + 1 + (GUARD_ALONE if by_rights else 0)
     return lost, found
 
 
@@ -127,7 +129,7 @@ def _place_of(see: View, n: int) -> tuple[float, float, int]:
             return x, y, -1
     if lost_by < 0 or not distance >= least_range(rig) or (rig.sensor.field > 0 and not in_view(x, y, see)):
         return x, y, -1
-    if near_track(percept, see.shared, x, y, rig):
+    if was_near_track(percept, see.shared, x, y, rig):
         return x, y, -1
     return x, y, lost_by
 

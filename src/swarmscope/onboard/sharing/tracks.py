@@ -9,7 +9,7 @@ import numpy as np
 from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.onboard.percept import PEERS, Row
 from swarmscope.onboard.rig import Rig
-from swarmscope.onboard.view import View
+from swarmscope.onboard.view import GUARD_ALONE, View
 
 SKIN_M = 0.01
 """What lies no farther outside a neighbour's body is the body."""
@@ -125,13 +125,14 @@ def _place(shared: Row, x: float, y: float) -> int:
 
 @jit
 def mask_moving_neighbours(see: View, still_s: float) -> None:
-    """Copy the scan into ``see.masked`` without the returns of neighbours that move (no return instead).
+    """Copy the scan into ``see.masked`` without the returns of neighbours that move (no return instead), nor those that
+    are kept for the guard alone.
 
     Moving neighbours are kept apart from by the yield rule and the guard; taken for obstacles they would
     make every robot turn off behind every other. One that has stood for ``still_s`` stays in: it is an obstacle.
     """
     for n in range(see.rig.sensor.beams):
-        see.masked[n] = see.scan[n]
+        see.masked[n] = np.inf if see.unseen[n] >= GUARD_ALONE else see.scan[n]
     for t in range(PEERS):
         if moves(see.percept, see.shared, t, still_s):
             returns_of(see, t, True)
@@ -190,24 +191,34 @@ def neighbour_reach(distance: float, rig: Rig) -> float:
 @jit
 def near_track(percept: Row, shared: Row, px: float, py: float, rig: Rig) -> bool:
     """Tell whether the return at (px, py), body frame, may belong to a neighbour."""
-    return _near_track(percept, shared, px, py, rig, False)
+    return _near_track(percept, shared, px, py, rig, 0.0)
 
 
 @jit
 def on_track(percept: Row, shared: Row, px: float, py: float, rig: Rig) -> bool:
     """Tell whether the return at (px, py), body frame, lies where a neighbour's body is, errors left aside."""
-    return _near_track(percept, shared, px, py, rig, True)
+    return _near_track(percept, shared, px, py, rig, -1.0)
+
+
+@jit
+def was_near_track(percept: Row, shared: Row, px: float, py: float, rig: Rig) -> bool:
+    """Tell whether what was at (px, py), body frame of now, a tick ago may have belonged to a neighbour."""
+    way = max(rig.guarding.others_mps, rig.body.v_max_mps) * percept["dt_s"]
+    return _near_track(percept, shared, px, py, rig, way)
 
 
 @jit_inner
-def _near_track(percept: Row, shared: Row, px: float, py: float, rig: Rig, exactly: bool) -> bool:
+def _near_track(percept: Row, shared: Row, px: float, py: float, rig: Rig, more: float) -> bool:
+    """Tell whether (px, py) lies within reach of a neighbour and ``more`` [m]; below 0: where its body is."""
     c, s = math.cos(percept["compass"]), math.sin(percept["compass"])
     gx, gy = c * px - s * py, s * px + c * py
     for t in range(PEERS):
         if shared["track_id"][t] < 0:
             continue
         x, y = shared["track_x"][t], shared["track_y"][t]
-        reach = rig.body.radius_m + SKIN_M if exactly else neighbour_reach(math.sqrt(x * x + y * y), rig)
+        reach = rig.body.radius_m + SKIN_M
+        if more >= 0.0:
+            reach = neighbour_reach(math.sqrt(x * x + y * y), rig) + more
         if (gx - x) ** 2 + (gy - y) ** 2 <= reach * reach:
             return True
     return False
