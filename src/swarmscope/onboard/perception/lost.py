@@ -50,13 +50,15 @@ def _find_lost(see: View, most: int) -> int:
     rig = see.rig
     total, least, far = rig.sensor.beams, least_range(rig), WITHIN * rig.sensor.range_max
     turned = int(math.floor(see.percept["odom_yaw"] / rig.sensor.increment + 0.5))
+    if rig.sensor.wraps:
+        turned %= total
     lost = 0
     for n in range(total):
         if not least <= see.kept[n] < far or see.unseen[n] >= most:
             continue
         m = n - turned
-        if rig.sensor.wraps:
-            m %= total
+        if rig.sensor.wraps and m < 0:
+            m += total
         if 0 <= m < total and see.scan[m] < rig.sensor.range_max:
             continue
         if lost == 0:
