@@ -47,6 +47,8 @@ def test_both_ends_of_every_range_are_drawn(key):
     found = np.array([run.case.values[group][name] for run in drawn() if name in run.case.values.get(group, {})])
     assert len(found) >= 15
     places = np.log(found / span.low) / np.log(span.high / span.low) if span.log else found / span.high
+    if span.inverse:
+        places = (1.0 / span.low - 1.0 / found) / (1.0 / span.low - 1.0 / span.high)
     assert places.min() < 0.3 and places.max() > 0.7
 
 
@@ -109,7 +111,11 @@ def test_worlds_of_every_kind_are_worlds(kind):
 
 def test_numbers_stay_in_their_span():
     rng = np.random.default_rng(0)
-    for span in (ranges.Span(0.1, 10.0, True), ranges.Span(0.0, 1.0)):
+    for span, middle in (
+        (ranges.Span(0.1, 10.0, True), 1.0),
+        (ranges.Span(0.0, 1.0), 0.5),
+        (ranges.Span(1.0, 20.0, inverse=True), 1.0 / 0.525),
+    ):
         found = [number(rng, span) for _ in range(5000)]
         assert span.low <= min(found) < max(found) <= span.high
-        assert np.median(found) == pytest.approx(1.0 if span.log else 0.5, rel=0.1)
+        assert np.median(found) == pytest.approx(middle, rel=0.1)

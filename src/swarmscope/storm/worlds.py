@@ -22,6 +22,8 @@ def number(rng: np.random.Generator, span: Span) -> float:
     """Return a number of the span, of six digits."""
     if span.log:
         drawn = math.exp(rng.uniform(math.log(span.low), math.log(span.high)))
+    elif span.inverse:
+        drawn = 1.0 / rng.uniform(1.0 / span.high, 1.0 / span.low)
     else:
         drawn = rng.uniform(span.low, span.high)
     return min(span.high, max(span.low, float(f"{drawn:.6g}")))

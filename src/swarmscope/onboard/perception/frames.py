@@ -14,6 +14,7 @@ import numpy as np
 from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.geometry import wrap_angle
 from swarmscope.onboard.percept import PEERS, Row
+from swarmscope.onboard.perception.beams import lies_between, nearest_beam
 from swarmscope.onboard.perception.mend import body_and_clearance, least_range
 from swarmscope.onboard.rig import Rig
 from swarmscope.onboard.sharing.tracks import on_track
@@ -106,17 +107,23 @@ def is_blurred(see: View, n: int) -> bool:
 @jit_inner
 def _draw(see: View, scan: np.ndarray, pose: np.ndarray) -> None:
     """Lower the beams out of view to what a kept scan shows there."""
-    sensor, shared = see.rig.sensor, see.shared
+    sensor, first, last = see.rig.sensor, see.shared["view_first"], see.shared["view_last"]
     c, si = math.cos(pose[2]), math.sin(pose[2])
     least = least_range(see.rig)
+    px, py, far = pose[0], pose[1], sensor.range_max
+    ax, ay, bx, by = see.rig.cos[first], see.rig.sin[first], see.rig.cos[last], see.rig.sin[last]
+    narrow = (last - first) * sensor.increment < math.pi
     for j in range(scan.size):
         s = scan[j]
-        if not 0.0 < s < sensor.range_max:
+        if not 0.0 < s < far:
             continue
         ux, uy = see.rig.cos[sensor.first + j], see.rig.sin[sensor.first + j]
-        x, y = pose[0] + s * (c * ux - si * uy), pose[1] + s * (si * ux + c * uy)
-        n = int(math.floor((math.atan2(y, x) - sensor.angle_min) / sensor.increment + 0.5)) % sensor.beams
-        if shared["view_first"] <= n <= shared["view_last"]:
+        x, y = px + s * (c * ux - si * uy), py + s * (si * ux + c * uy)
+        left_of_first, right_of_last = ax * y - ay * x > 0.0, x * by - y * bx > 0.0
+        if (left_of_first and right_of_last) if narrow else (left_of_first or right_of_last):
+            continue  # in view, by half a beam: no need to ask which one
+        n = nearest_beam(x, y, 0.0, sensor)
+        if first <= n <= last:
             continue
         distance = math.sqrt(x * x + y * y)
         distance -= _astray(pose, distance, see.rig)
@@ -196,10 +203,7 @@ def _copy(see: View, out: np.ndarray) -> None:
 @jit_inline
 def in_view(x: float, y: float, see: View) -> bool:
     """Tell whether the point (x, y), body frame, lies between the first and the last beam."""
-    beam = (math.atan2(y, x) - see.rig.sensor.angle_min) / see.rig.sensor.increment
-    if beam < 0.0:
-        beam += 2.0 * math.pi / see.rig.sensor.increment
-    return bool(see.shared["view_first"] <= beam <= see.shared["view_last"])
+    return lies_between(x, y, see.shared["view_first"], see.shared["view_last"], see.rig.sensor)
 
 
 @jit
@@ -215,8 +219,7 @@ def was_free(see: View, x: float, y: float) -> bool:
         far = math.sqrt(px * px + py * py) + _astray(pose, reach, see.rig)
         if far < core:
             return True
-        bearing = math.atan2(py, px) - pose[2]
-        n = int(math.floor((bearing - sensor.angle_min) / sensor.increment + 0.5)) % sensor.beams - sensor.first
+        n = nearest_beam(px, py, pose[2], sensor) - sensor.first
         if 0 <= n < sensor.field and far <= abs(see.frames.scans[k, n]):
             return True
     return False
