@@ -12,8 +12,10 @@ from swarmscope.onboard.view import View
 
 LOOK_SHARE = 0.4
 """Of the field of view, by which a robot that looks round turns in a tick."""
-FRONT, FRONT_RAD = 5, 1.8
-"""The front of the body is looked at in so many places to either side, up to this angle [rad]."""
+FRONT_RAD = 1.8
+"""The front of the body is looked at up to this angle to either side [rad], ..."""
+GRAIN_M = 0.05
+"""... in places so far apart."""
 
 
 @jit
@@ -25,7 +27,7 @@ def out_of_sight(see: View, way: Way, need: float) -> tuple[float, float]:
         length = math.sqrt((x1 - x0) ** 2 + (y1 - y0) ** 2)
         if length > 1e-9:
             fx, fy = need * (x1 - x0) / length, need * (y1 - y0) / length
-            stops = int(math.ceil(length / (0.5 * need)))
+            stops = int(math.ceil(length / GRAIN_M))
             for k in range(1, stops + 1):
                 part = k / stops
                 x, y = _unseen_front(see, x0 + part * (x1 - x0), y0 + part * (y1 - y0), fx, fy)
@@ -53,8 +55,9 @@ def look_round(see: View, v: float, w: float, why: int) -> tuple[float, float, i
 @jit_inner
 def _unseen_front(see: View, x: float, y: float, fx: float, fy: float) -> tuple[float, float]:
     """Return a place on the front of the body at (x, y), which looks along f [m], that nobody has seen free."""
-    for k in range(-FRONT, FRONT + 1):
-        a = k * FRONT_RAD / FRONT
+    places = int(math.ceil(FRONT_RAD * math.sqrt(fx * fx + fy * fy) / GRAIN_M))
+    for k in range(-places, places + 1):
+        a = k * FRONT_RAD / places
         px, py = x + fx * math.cos(a) - fy * math.sin(a), y + fx * math.sin(a) + fy * math.cos(a)
         if not in_view(px, py, see) and not was_free(see, px, py):
             return px, py
