@@ -27,12 +27,13 @@ def test_sound_readings_stay():
     assert (count, broken) == (0, [])
 
 
-def test_a_small_hole_is_as_near_as_what_is_beside_less_a_corner():
+@pytest.mark.parametrize(("beside", "bridged"), [(2.0, 2.0), (0.5, 0.5 * (1.0 - ONE))])
+def test_a_small_hole_is_as_near_as_what_is_beside_and_near_the_body_less_a_corner(beside, bridged):
     given = np.full(360, 3.0)
     given[[10, 11]] = np.nan
-    given[12] = 2.0
+    given[12] = beside
     scan, count, broken = mended(given)
-    assert scan[[10, 11]] == pytest.approx(2.0 * (1.0 - ONE))
+    assert scan[[10, 11]] == pytest.approx(bridged)
     assert (count, broken) == (2, [10, 11])
 
 

@@ -9,6 +9,8 @@ import numpy as np
 from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.onboard.rig import Rig
 
+NEAR_BODIES = 4.0
+"""Within so many times what touches the body centimetres count."""
 BESIDE = 1e-6
 """A blocked beam ends this far outside of what the guard keeps free [m]."""
 
@@ -31,8 +33,9 @@ def mend(ranges: np.ndarray, rig: Rig, broken: np.ndarray) -> int:
 
     ``broken (M,)`` uint8 becomes 1 for each of them, 0 for the others.
 
-    A run of them becomes as near as the nearer of the two readings beside it, less what a corner may stand out there,
-    and never farther than a body in the hole could be; with nothing sound beside it, it is what touches the body.
+    A run of them becomes as near as the nearer of the two readings beside it, near the body less what a corner may
+    stand out there, and never farther than a body in the hole could be; with nothing sound beside it, it is what
+    touches the body.
     """
     least = least_range(rig)
     count = 0
@@ -81,5 +84,6 @@ def _behind(ranges: np.ndarray, k: int, stop: int, rig: Rig) -> float:
         return touching  # beyond the body something may stand too near to be measured
     fits = rig.body.radius_m / math.sin(0.5 * width) - rig.body.radius_m
     beside = min(float(ranges[(k - 1) % total]), float(ranges[stop % total]))
-    corner = beside * (1.0 - 0.5 * (stop - k) * rig.sensor.increment)  # of a right angle, in the hole
-    return max(touching, min(fits, corner))
+    if beside < NEAR_BODIES * touching:
+        beside *= 1.0 - 0.5 * (stop - k) * rig.sensor.increment  # a corner of a right angle, in the hole
+    return max(touching, min(fits, beside))
