@@ -8,6 +8,8 @@ from typing import TypeAlias
 from swarmscope._jit import jit_inline
 
 TWO_PI = 2.0 * math.pi
+ROUGH = 1e-6
+"""`rough_angle` is nearer than this to the angle [rad]."""
 Pose: TypeAlias = tuple[float, float, float]
 """x [m], y [m], yaw [rad]."""
 
@@ -19,6 +21,21 @@ def wrap_angle(angle: float) -> float:
     if wrapped <= -math.pi:
         wrapped += TWO_PI
     return wrapped
+
+
+@jit_inline
+def rough_angle(x: float, y: float) -> float:
+    """Return atan2(y, x) [rad] to within `ROUGH`, several times faster, where y is not 0."""
+    wide, high = abs(x), abs(y)
+    ratio = min(wide, high) / max(wide, high, 1e-300)
+    s = ratio * ratio
+    series = ((0.0068117791795 * s - 0.0336041791392) * s + 0.0796236263468) * s - 0.132333397004
+    angle = (((series * s + 0.198078149831) * s - 0.333173679991) * s + 0.999996111538) * ratio
+    if high > wide:
+        angle = 0.5 * math.pi - angle
+    if x < 0.0:
+        angle = math.pi - angle
+    return -angle if y < 0.0 else angle
 
 
 @jit_inline

@@ -11,8 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarmscope.errors import ConfigError
+from swarmscope.geometry import rough_angle
 from swarmscope.sim.contact import static_clearance
-from swarmscope.sim.lidar import ANGLE_SLACK, _rough_angle, cast_disc, cast_static, make_beams
+from swarmscope.sim.lidar import ANGLE_SLACK, cast_disc, cast_static, make_beams
 from swarmscope.sim.maps import load_map, packaged_map
 from swarmscope.sim.world import WALL_M, Circle, Polygon, Wall, WorldSpec, compile_world, grid_from_solid
 
@@ -172,7 +173,7 @@ def test_impossible_lidars_are_refused(arguments):
 
 def test_rough_angle_stays_within_its_slack():
     angles = np.linspace(-math.pi, math.pi, 200001)
-    rough = np.array([_rough_angle(x, y) for x, y in zip(np.cos(angles), np.sin(angles), strict=True)])
+    rough = np.array([rough_angle(x, y) for x, y in zip(np.cos(angles), np.sin(angles), strict=True)])
     off = np.abs(np.remainder(rough - angles + math.pi, FULL) - math.pi)
     assert off.max() < 0.5 * ANGLE_SLACK
 

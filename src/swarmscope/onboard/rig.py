@@ -74,6 +74,8 @@ class Sharing(NamedTuple):
     """Features older than this are not used."""
 
 
+SIGMAS = 3.0
+"""Ranges and odometry may err by so many standard deviations."""
 MOST_LEVELS = 32
 """Levels of speed, 5 kB of tables each."""
 LEAST_MPS = 0.01

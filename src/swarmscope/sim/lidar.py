@@ -15,13 +15,14 @@ import numpy.typing as npt
 
 from swarmscope._jit import jit, jit_inline
 from swarmscope.errors import ConfigError
+from swarmscope.geometry import rough_angle
 from swarmscope.sim.world import PIECE_M, World, bin_index, bin_run
 
 Bytes = npt.NDArray[np.uint8]
 Ranges = npt.NDArray[np.float32]
 
 ANGLE_SLACK = 5e-4
-"""Added to each side of an obstacle's angular interval [rad]; larger than the error of `_rough_angle`."""
+"""Added to each side of an obstacle's angular interval [rad]; larger than the error of `rough_angle`."""
 
 
 class Beams(NamedTuple):
@@ -87,7 +88,7 @@ def cast_disc(cx: float, cy: float, radius: float, beams: Beams, out: Ranges) ->
         return
     ratio = radius / math.sqrt(distance2)
     half = ratio + (0.5 * math.pi - 1.0) * ratio * ratio * ratio + ANGLE_SLACK  # never below asin(ratio)
-    low, high = _beam_offsets(_rough_angle(cx, cy) - half, 2.0 * half, beams)
+    low, high = _beam_offsets(rough_angle(cx, cy) - half, 2.0 * half, beams)
     total = out.shape[0]
     _disc_run(cx, cy, radius, beams, int(low), min(int(high) + 2, total), out)
     turn = 2.0 * math.pi / beams.increment
@@ -99,7 +100,7 @@ def cast_disc(cx: float, cy: float, radius: float, beams: Beams, out: Ranges) ->
 def _cast_segment(ax: float, ay: float, bx: float, by: float, beams: Beams, out: Ranges) -> None:
     """Lower ``out`` (M,) where segment a-b [m], sensor frame, is nearer."""
     total = out.shape[0]
-    angle_a, angle_b = _rough_angle(ax, ay), _rough_angle(bx, by)
+    angle_a, angle_b = rough_angle(ax, ay), rough_angle(bx, by)
     width = angle_b - angle_a
     if width > math.pi:
         width -= 2.0 * math.pi
@@ -151,20 +152,6 @@ def _segment_run(
             distance = area / (side_a - side_b)
             if 0.0 <= distance <= beams.range_max and distance < out[n]:
                 out[n] = distance
-
-
-@jit_inline
-def _rough_angle(x: float, y: float) -> float:
-    """Return atan2(y, x) [rad] to within 2e-4, several times faster."""
-    wide, high = abs(x), abs(y)
-    ratio = min(wide, high) / max(wide, high, 1e-300)
-    square = ratio * ratio
-    angle = ((-0.0464964749 * square + 0.15931422) * square - 0.327622764) * square * ratio + ratio
-    if high > wide:
-        angle = 0.5 * math.pi - angle
-    if x < 0.0:
-        angle = math.pi - angle
-    return -angle if y < 0.0 else angle
 
 
 @jit_inline

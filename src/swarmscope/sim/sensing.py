@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from swarmscope._jit import jit, jit_inner
-from swarmscope.geometry import wrap_angle
+from swarmscope.geometry import ray_circle, wrap_angle
 from swarmscope.onboard.percept import MAX_INBOX, MAX_NEIGHBOURS, Row
 from swarmscope.sim.cells import column_of, row_of
 from swarmscope.sim.errors import compass_error, measure_motion, spoil_scan
@@ -125,8 +125,7 @@ def _shows(sim: Sim, i: int, distance: float, bearing: float) -> bool:
         if not 0 <= n < ranges.size:
             continue
         off = (k - middle) * beams.increment
-        across = distance * math.sin(off)
-        surface = distance * math.cos(off) - math.sqrt(max(0.0, radius * radius - across * across))
+        surface = ray_circle(math.cos(off), math.sin(off), distance, 0.0, radius)
         if surface <= beams.range_max and ranges[n] >= surface - SIGHT_SLACK:
             return True
     return False

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from swarmscope._jit import jit
-from swarmscope.onboard.perception.beams import ROUGH, lies_between, nearest_beam, rough_angle
+from swarmscope.geometry import ROUGH, rough_angle
+from swarmscope.onboard.perception.beams import lies_between, nearest_beam
 from swarmscope.onboard.sensor import Sensor, all_round
 
 

@@ -30,7 +30,7 @@ from swarmscope.onboard.reasons import (
     R_HELD_THING,
     R_HELD_UNSEEN,
 )
-from swarmscope.onboard.rig import Rig
+from swarmscope.onboard.rig import SIGMAS, Rig
 from swarmscope.onboard.sharing.tracks import near_track, returns_of
 from swarmscope.onboard.view import View
 
@@ -42,10 +42,6 @@ STANDS_MPS = 1e-6
 SOME_LOSSES, MOST_LOSSES = 0.2, 0.35
 """Shares of returns lost from scan to scan from which on a robot slows down, and at which it stands. Of beams lost by
 chance with probability p a share p^3 is lost together with both beams beside them."""
-
-
-SIGMAS = 3.0
-"""A range may err by so many of the LiDAR's standard deviations."""
 
 
 class Kept(NamedTuple):

@@ -5,25 +5,8 @@ from __future__ import annotations
 import math
 
 from swarmscope._jit import jit_inline
+from swarmscope.geometry import ROUGH, rough_angle
 from swarmscope.onboard.sensor import Sensor
-
-ROUGH = 1e-6
-"""`rough_angle` is nearer than this to the angle [rad]."""
-
-
-@jit_inline
-def rough_angle(x: float, y: float) -> float:
-    """Return atan2(y, x) [rad] to within `ROUGH`, where y is not 0."""
-    wide, high = abs(x), abs(y)
-    ratio = min(wide, high) / max(wide, high, 1e-300)
-    s = ratio * ratio
-    series = ((0.0068117791795 * s - 0.0336041791392) * s + 0.0796236263468) * s - 0.132333397004
-    angle = (((series * s + 0.198078149831) * s - 0.333173679991) * s + 0.999996111538) * ratio
-    if high > wide:
-        angle = 0.5 * math.pi - angle
-    if x < 0.0:
-        angle = math.pi - angle
-    return -angle if y < 0.0 else angle
 
 
 @jit_inline

@@ -12,11 +12,11 @@ import math
 import numpy as np
 
 from swarmscope._jit import jit, jit_inline, jit_inner
-from swarmscope.geometry import wrap_angle
+from swarmscope.geometry import ray_circle, seen_from
 from swarmscope.onboard.percept import PEERS, Row
 from swarmscope.onboard.perception.beams import lies_between, nearest_beam
 from swarmscope.onboard.perception.mend import body_and_clearance, least_range
-from swarmscope.onboard.rig import Rig
+from swarmscope.onboard.rig import SIGMAS, Rig
 from swarmscope.onboard.sharing.tracks import on_track
 from swarmscope.onboard.view import POSE, View
 
@@ -24,8 +24,6 @@ STEP_RADII = 0.4
 """After a way of so many radii another scan is kept, ..."""
 STEP_SHARE = 0.4
 """... or after a turn by this share of the field of view."""
-SIGMAS = 3.0
-"""Odometry may err by so many standard deviations."""
 LOOK_RADII = 0.2
 """After a way of so many radii another look is worth while."""
 SAME_RADII, SAME_SHARE = 0.2, 0.15
@@ -61,15 +59,12 @@ def look_back(see: View) -> None:
 @jit_inner
 def _move_on(percept: Row, poses: np.ndarray) -> None:
     """Express where scans were taken in the body frame of now."""
-    dx, dy, turned = percept["odom_x"], percept["odom_y"], percept["odom_yaw"]
-    c, s = math.cos(turned), math.sin(turned)
-    way = math.sqrt(dx * dx + dy * dy)
+    here = (percept["odom_x"], percept["odom_y"], percept["odom_yaw"])
+    way = math.sqrt(here[0] ** 2 + here[1] ** 2)
     for k in range(len(poses)):
-        x, y = poses[k, 0] - dx, poses[k, 1] - dy
-        poses[k, 0], poses[k, 1] = c * x + s * y, c * y - s * x
-        poses[k, 2] = wrap_angle(poses[k, 2] - turned)
+        poses[k, 0], poses[k, 1], poses[k, 2] = seen_from(here, (poses[k, 0], poses[k, 1], poses[k, 2]))
         poses[k, 3] += way
-        poses[k, 4] += abs(turned)
+        poses[k, 4] += abs(here[2])
 
 
 @jit_inline
@@ -145,9 +140,7 @@ def _draw_neighbour(see: View, t: int) -> None:
         if shared["view_first"] <= n <= shared["view_last"]:
             continue
         off = (k - middle) * sensor.increment
-        across = d * math.sin(off)
-        s = d * math.cos(off) - math.sqrt(max(0.0, radius * radius - across * across))
-        see.scan[n] = min(see.scan[n], s)
+        see.scan[n] = min(see.scan[n], ray_circle(math.cos(off), math.sin(off), d, 0.0, radius))
 
 
 @jit
