@@ -13,9 +13,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-
 from swarmscope._jit import jit, jit_inline, jit_inner
+from swarmscope.onboard.control.corners import apart_round, out_of_hidden_halves
+from swarmscope.onboard.control.halves import in_own_half, met_by
 from swarmscope.onboard.control.horizon import horizon_speed
 from swarmscope.onboard.control.unseen import look_round, out_of_sight
 from swarmscope.onboard.control.way import STEPS, Way, closer, shadowed, way_of
@@ -167,7 +167,7 @@ def _near(see: View, speed: float) -> Near:
     limit = body.radius_m + guarding.clearance_m + way + brake
     if guarding.others_mps > 0.0:
         stranger = 0.0 if guarding.others_yield else guarding.others_mps * (delay + speed / body.a_max_mps2)
-        limit += max(way + 3.0 * brake, stranger)
+        limit = max(limit, apart_round(rig) - body.radius_m + way + brake) + max(way + 3.0 * brake, stranger)
     limit /= max(0.5, 1.0 - SIGMAS * rig.sensor.range_sigma)
     least = least_range(rig)
     count = 0
@@ -193,7 +193,7 @@ def _held_by(see: View, v: float, w: float, near: Near) -> int:
     if way.x5 * way.x5 + way.y5 * way.y5 + way.brake < 1e-10 and speed < STANDS_MPS:
         return FREE
     alone = not rig.guarding.others_mps > 0.0
-    met = _met_by(v, percept["dt_s"], rig)
+    met = met_by(v, percept["dt_s"], rig)
     if not alone and not _clear_of_tracks(see, way, met):
         return R_HELD_ROBOT
     kept = _distance_kept(v, w, see)
@@ -245,11 +245,10 @@ def _held_by_beam(see: View, n: int, way: Way, met: float, kept: Kept) -> int:
         return R_HELD_THING
     if not rig.guarding.others_mps > 0.0:
         return FREE
-    if s > _listed_up_to(percept, rig) or near_track(percept, see.shared, px, py, rig):
-        return FREE if _in_own_half(px, py, s, way, met, rig) else R_HELD_ROBOT
-    if _is_corner(see.scan, n, rig) and not _stops_before(px, py, s, way, met, rig):
-        return R_HELD_CORNER
-    return FREE
+    may_be_a_robot = s > _listed_up_to(percept, rig) or near_track(percept, see.shared, px, py, rig)
+    if may_be_a_robot and not in_own_half(px, py, s, way, met, rig):
+        return R_HELD_ROBOT
+    return FREE if out_of_hidden_halves(see, n, way, met) else R_HELD_CORNER
 
 
 @jit_inline
@@ -259,57 +258,6 @@ def _listed_up_to(percept: Row, rig: Rig) -> float:
     if percept["n_neighbours"] < MAX_NEIGHBOURS:
         return math.inf
     return math.sqrt(percept["neighbour_x"][k] ** 2 + percept["neighbour_y"][k] ** 2) - 1.5 * rig.body.radius_m
-
-
-@jit_inner
-def _is_corner(ranges: np.ndarray, n: int, rig: Rig) -> bool:
-    """Tell whether a robot can come into view past the return of beam n: beside it there is room for one behind it."""
-    room = ranges[n] + 2.0 * (rig.body.radius_m + rig.guarding.clearance_m)
-    after, before = n + 1, n - 1
-    if after == ranges.size:
-        after = 0 if rig.sensor.wraps else n
-    if before < 0:
-        before = ranges.size - 1 if rig.sensor.wraps else n
-    return bool(ranges[after] > room or ranges[before] > room)
-
-
-@jit_inner
-def _stops_before(px: float, py: float, s: float, way: Way, met: float, rig: Rig) -> bool:
-    """Tell whether the robot can stop before it meets one that comes into view past the corner at (px, py).
-
-    Both keep out of the circle round it that their body fills: x + b <= s - radius - half the clearance.
-    """
-    towards = max(way.x4 * px + way.y4 * py, way.x5 * px + way.y5 * py) / s
-    return bool(towards <= 1e-6 or towards + met <= s - rig.body.radius_m - 0.5 * rig.guarding.clearance_m)
-
-
-@jit_inline
-def _met_by(v: float, dt: float, rig: Rig) -> float:
-    """Return how far one that does not yield comes until a robot that drives at ``v`` [m/s] stands [m]; others 0."""
-    if rig.guarding.others_yield:
-        return 0.0
-    return rig.guarding.others_mps * (dt + rig.guarding.latency_s + v / rig.body.a_max_mps2)
-
-
-@jit_inner
-def _in_own_half(px: float, py: float, s: float, way: Way, met: float, rig: Rig) -> bool:
-    """Tell whether a way keeps to its half of the gap to (px, py); its braking counts twice.
-
-    (px, py) is the nearest known point of a neighbour's body at range ``s``. Before one that does not yield the robot
-    stands before it is reached.
-    """
-    if s <= 1e-6:
-        return way.x5 * way.x5 + way.y5 * way.y5 < 1e-9
-    nx, ny = px / s, py / s
-    moved = way.x4 * nx + way.y4 * ny
-    stopped = way.x5 * nx + way.y5 * ny
-    towards = max(moved, stopped)
-    if towards <= 1e-6:
-        return True
-    free = s - rig.body.radius_m - rig.guarding.clearance_m
-    if rig.guarding.others_yield:
-        return towards + max(0.0, stopped - moved) <= 0.5 * free
-    return towards + met <= free
 
 
 @jit_inner
@@ -327,6 +275,6 @@ def _clear_of_tracks(see: View, way: Way, met: float) -> bool:
             return False
         surface = max(see.other.distances[t], 1e-6)
         scale = surface / d
-        if not _in_own_half(x * scale, y * scale, surface, way, met, rig):
+        if not in_own_half(x * scale, y * scale, surface, way, met, rig):
             return False
     return True

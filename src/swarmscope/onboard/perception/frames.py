@@ -190,7 +190,7 @@ def _copy(see: View, out: np.ndarray) -> None:
         elif s < rig.sensor.range_max and on_track(see.percept, see.shared, s * rig.cos[n], s * rig.sin[n], rig):
             out[j] = -s
         else:
-            out[j] = s
+            out[j] = min(s, rig.sensor.range_max)  # beyond nobody knows
 
 
 @jit_inline

@@ -1,0 +1,160 @@
+"""Robots that nobody sees yet: whether a way keeps to its half of every place from which one could come into view.
+
+Behind the edge of a thing there may be a robot, where its whole body is hidden. The nearest such place at an edge is
+looked for in the scan; the rule between two robots (docs/safety.md) then holds for a body there as for one in view.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from swarmscope._jit import jit, jit_inline, jit_inner
+from swarmscope.onboard.control.way import Way
+from swarmscope.onboard.rig import SIGMAS, Rig
+from swarmscope.onboard.view import View
+
+
+class Corner(NamedTuple):
+    """A return past which it opens, in the frame of the first line of sight past it: along, and into the shadow."""
+
+    c: float
+    """Direction of that line, body frame."""
+    s: float
+    side: float
+    """1: it opens to the left of the return."""
+    x: float
+    y: float
+    keeps: float
+    """What centres keep off the corner [m]."""
+
+
+@jit
+def out_of_hidden_halves(see: View, n: int, way: Way, met: float) -> bool:
+    """Tell whether a way keeps out of the half of every robot that may be hidden past the return of beam n.
+
+    ``met`` [m]: how far one that does not yield comes until this robot stands.
+    """
+    return _clear_past(see, n, 1, way, met) and _clear_past(see, n, -1, way, met)
+
+
+@jit_inline
+def apart_round(rig: Rig) -> float:
+    """Return how far two robots are apart at least, measured round a corner that both keep off, while they are not
+    closer than their clearance [m]: bodies that touch lie on the circle that both keep off."""
+    keeps = rig.body.radius_m + rig.guarding.clearance_m
+    return 2.0 * keeps * math.asin(rig.body.radius_m / keeps) + rig.guarding.clearance_m
+
+
+@jit_inner
+def _opens(ranges: np.ndarray, n: int, side: int, rig: Rig) -> bool:
+    """Tell whether a robot fits between the return of beam n and that of the next one on a side, which is farther."""
+    m = _beam(n + side, rig)
+    if m < 0 or not ranges[m] > ranges[n]:
+        return False
+    far = (1.0 + SIGMAS * rig.sensor.range_sigma) * ranges[m]
+    if not far < rig.sensor.range_max:
+        return True
+    near = ranges[n] * (1.0 - SIGMAS * rig.sensor.range_sigma)
+    gap2 = near * near + far * far - 2.0 * near * far * math.cos(rig.sensor.increment)
+    return bool(gap2 >= 4.0 * rig.body.radius_m * rig.body.radius_m)
+
+
+@jit_inner
+def _clear_past(see: View, n: int, side: int, way: Way, met: float) -> bool:
+    """Apply the rule between two robots to a body hidden past the return of beam n on a side, if it opens there.
+
+    Both have to go round the corner, so lengths are those of ways round it.
+    """
+    rig, radius = see.rig, see.rig.body.radius_m
+    if not _opens(see.scan, n, side, rig):
+        return True
+    keeps, touch = radius + rig.guarding.clearance_m, apart_round(rig)
+    most = math.sqrt(way.x5 * way.x5 + way.y5 * way.y5) + way.brake
+    enough = touch + max(2.0 * most, most + met)
+    along = _hidden_at(see.scan, n, side, enough, rig)
+    if along >= enough:
+        return True
+    c, s = _direction(n + side, rig)
+    turned = side * rig.sensor.increment
+    near = see.scan[n] * max(0.5, 1.0 - SIGMAS * rig.sensor.range_sigma)
+    corner = Corner(c, s, float(side), near * math.cos(turned), near * abs(math.sin(turned)), keeps)
+    along = max(along, corner.x + keeps)  # there it is the shortest way
+    now = _way_round(0.0, 0.0, along, radius, corner)
+    moved = now - _way_round(way.x4, way.y4, along, radius, corner)
+    stopped = now - _way_round(way.x5, way.y5, along, radius, corner)
+    towards = max(moved, stopped)
+    if towards <= 1e-6:
+        return True
+    if rig.guarding.others_yield:
+        return towards + max(0.0, stopped - moved) <= 0.5 * (now - touch)
+    return towards + met <= now - touch
+
+
+@jit_inner
+def _way_round(qx: float, qy: float, along: float, beside: float, corner: Corner) -> float:
+    """Return how far it is from (qx, qy), body frame, round a corner to a place behind it [m]."""
+    x = qx * corner.c + qy * corner.s - corner.x
+    y = corner.side * (qx * corner.s - qy * corner.c) - corner.y
+    far = along - corner.x, beside - corner.y
+    d, e = math.sqrt(x * x + y * y), math.sqrt(far[0] * far[0] + far[1] * far[1])
+    begin, end = math.atan2(y, x), math.atan2(far[1], far[0])
+    if begin > 0.5 * math.pi:
+        begin -= 2.0 * math.pi
+    near = min(corner.keeps, d, e)
+    if near < 1e-9:
+        return d + e
+    arc = end - begin - math.acos(min(1.0, near / d)) - math.acos(min(1.0, near / e))
+    if arc <= 0.0:
+        return math.sqrt((far[0] - x) ** 2 + (far[1] - y) ** 2)
+    return math.sqrt(d * d - near * near) + math.sqrt(e * e - near * near) + near * arc
+
+
+@jit_inner
+def _hidden_at(ranges: np.ndarray, n: int, side: int, enough: float, rig: Rig) -> float:
+    """Return how far along the line of sight past an edge the centre of a body is that touches it and is hidden [m].
+
+    Beams that the body would cross have to end before it. Beyond ``enough`` [m] it does not matter.
+    """
+    radius, increment = rig.body.radius_m, rig.sensor.increment
+    nearer = max(0.5, 1.0 - SIGMAS * rig.sensor.range_sigma)
+    along = nearer * ranges[n]
+    k = 1
+    while along < enough and k < rig.sensor.beams:
+        psi = k * increment
+        c, s = math.cos(psi), math.sin(psi)
+        off = along * s - radius * c
+        if off >= radius:
+            break
+        m = _beam(n + side - side * k, rig)
+        along = max(along, _before(nearer * ranges[m] if m >= 0 else math.inf, c, s, radius))
+        k += 1
+    return along
+
+
+@jit_inline
+def _before(end: float, c: float, s: float, radius: float) -> float:
+    """Return the least way along at which a body does not reach into a beam (c, s) that ends at range ``end``."""
+    misses = radius * (1.0 + c) / s  # as far along the beam as along the line of sight: both are tangents
+    off = end * s - radius
+    if not end < misses or off >= radius:
+        return misses
+    return min(misses, end * c + math.sqrt(radius * radius - off * off))
+
+
+@jit_inline
+def _direction(m: int, rig: Rig) -> tuple[float, float]:
+    """Return the direction of a beam that need not be there."""
+    a = rig.sensor.angle_min + m * rig.sensor.increment
+    return math.cos(a), math.sin(a)
+
+
+@jit_inline
+def _beam(n: int, rig: Rig) -> int:
+    """Return the beam of number n, -1 where there is none."""
+    total = rig.sensor.beams
+    if rig.sensor.wraps:
+        return n % total
+    return n if 0 <= n < total else -1
