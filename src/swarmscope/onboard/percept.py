@@ -89,6 +89,7 @@ SHARED = np.dtype(
         ("track_vy", np.float64, PEERS),
         ("track_yaw", np.float64, PEERS),  # compass frame [rad]
         ("track_seen_s", np.float64, PEERS),  # when last observed
+        ("track_n", np.uint8, PEERS),  # how often, one tick after the other, at most 255
         ("track_anchor_x", np.float64, PEERS),  # where it was when it last moved, own odometry frame [m]
         ("track_anchor_y", np.float64, PEERS),
         ("track_moved_s", np.float64, PEERS),  # when it last moved

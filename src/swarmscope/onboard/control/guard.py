@@ -104,7 +104,7 @@ def _allowed(see: View, asked: float, w: float) -> tuple[float, float, int]:
     """Return the fastest command up to ``asked`` [m/s] that passes, its turn rate, and why it is not faster."""
     percept, body = see.percept, see.rig.body
     dt, speed = percept["dt_s"], _speed_at_most(see)
-    wanted = min(asked, _horizon_speed(see.rig, dt))
+    wanted = min(asked, speed_of_horizon(see.rig, dt))
     if see.shared["losses"] > SOME_LOSSES:
         wanted *= (MOST_LOSSES - see.shared["losses"]) / (MOST_LOSSES - SOME_LOSSES)
     near = _near(see, max(speed, min(wanted, speed + body.a_max_mps2 * dt)))
@@ -148,9 +148,9 @@ def _measure_gaps(see: View) -> None:
         see.other.distances[t] = least
 
 
-@jit_inner
-def _horizon_speed(rig: Rig, dt: float) -> float:
-    """Return the speed that the longest view allows."""
+@jit
+def speed_of_horizon(rig: Rig, dt: float) -> float:
+    """Return the largest speed [m/s] that the longest view allows with a decision every ``dt`` [s]."""
     guarding, taken = rig.guarding, rig.body.radius_m + rig.guarding.clearance_m
     robots = rig.horizon.robots - taken if guarding.others_mps > 0.0 else math.inf
     stranger = 0.0 if guarding.others_yield else guarding.others_mps
