@@ -22,6 +22,8 @@ FEWEST_FRAMES, FRAMES_PER_TURN = 6, 2.7
 GUARD_ALONE = 128
 """Added to ``View.unseen`` where a beam may have lost a return by rights, at the edge of a thing that the next beam
 sees: planners would give every edge a wider berth."""
+BROKEN = 64
+"""Added to ``View.unseen`` where the beam is broken and what stands there is bridged."""
 POSE = 5
 """Numbers that say where a scan was taken."""
 
@@ -50,7 +52,7 @@ class View(NamedTuple):
     kept: np.ndarray
     """(M,) float32: the scan of the last tick with what it had lost; 0 = there was none."""
     unseen: np.ndarray
-    """(M,) uint8: for how many ticks what is kept there has not been seen; plus GUARD_ALONE: for the guard only."""
+    """(M,) uint8: for how many ticks what is kept there has not been seen, plus GUARD_ALONE and BROKEN."""
     frames: Frames
     masked: np.ndarray
     """(M,) float32: the scan without moving neighbours."""

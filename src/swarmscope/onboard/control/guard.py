@@ -32,7 +32,7 @@ from swarmscope.onboard.reasons import (
 )
 from swarmscope.onboard.rig import SIGMAS, Rig
 from swarmscope.onboard.sharing.tracks import near_track, returns_of
-from swarmscope.onboard.view import View
+from swarmscope.onboard.view import BROKEN, View
 
 FRACTIONS = (1.0, 0.8, 0.6, 0.4, 0.2, 0.1, 0.05, 0.0)
 FREE = -1
@@ -173,7 +173,7 @@ def _near(see: View, speed: float) -> Near:
     count = 0
     nearest = math.inf
     for n in range(rig.sensor.beams):
-        if not ranges[n] >= limit:
+        if not ranges[n] >= limit or see.unseen[n] & BROKEN:
             near[count] = n
             count += 1
             if least <= ranges[n] < nearest:
@@ -239,6 +239,8 @@ def _held_by_beam(see: View, n: int, way: Way, met: float, kept: Kept) -> int:
         s = _at_least(s, kept.spare, rig)
     else:
         s = body_and_clearance(rig)
+    if see.unseen[n] & BROKEN:
+        s = min(s, _through_hole(see, n))
     need = min(kept.distance, s - 1e-6)  # already too close: never closer
     px, py = s * rig.cos[n], s * rig.sin[n]
     if closer(px, py, way, need) or (way.turns and shadowed(px, py, rig.cos[n], rig.sin[n], way, need)):
@@ -249,6 +251,20 @@ def _held_by_beam(see: View, n: int, way: Way, met: float, kept: Kept) -> int:
     if may_be_a_robot and not in_own_half(px, py, s, way, met, rig):
         return R_HELD_ROBOT
     return FREE if out_of_hidden_halves(see, n, way, met) else R_HELD_CORNER
+
+
+@jit_inner
+def _through_hole(see: View, n: int) -> float:
+    """Return up to which range nothing can stand in the hole that beam n is in [m]: it would show beside it."""
+    total, wraps = see.rig.sensor.beams, see.rig.sensor.wraps
+    width = 2
+    for step in (1, -1):
+        k = n + step
+        while 0 <= (k % total if wraps else k) < total and see.unseen[k % total] & BROKEN and width < total:
+            width += 1
+            k += step
+    half = 0.5 * width * see.rig.sensor.increment
+    return 0.5 * see.rig.guarding.thinnest_m / math.sin(half) if half < 0.5 * math.pi else 0.0
 
 
 @jit_inline

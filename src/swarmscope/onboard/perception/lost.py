@@ -14,7 +14,7 @@ from swarmscope.onboard.percept import Row
 from swarmscope.onboard.perception.frames import in_view
 from swarmscope.onboard.perception.mend import least_range
 from swarmscope.onboard.sharing.tracks import was_near_track
-from swarmscope.onboard.view import GUARD_ALONE, View
+from swarmscope.onboard.view import BROKEN, GUARD_ALONE, View
 
 WITHIN = 0.9
 """Returns beyond this share of the range are not kept: they leave it by themselves."""
@@ -25,7 +25,7 @@ THROUGH = 0.1
 MEMORY = 0.9
 """What stays of the share of lost returns from tick to tick."""
 SLIPS = 2
-MOST_TICKS = GUARD_ALONE - 1
+MOST_TICKS = BROKEN - 1
 
 
 @jit
@@ -45,11 +45,11 @@ def keep_lost(see: View, broken: int) -> None:
         lost, found = _find_lost(see, int(most + 0.5))
     _note_losses(percept, see.shared, seen, lost)
     for n in range(rig.sensor.beams):
-        see.unseen[n] = 0
+        see.unseen[n] = BROKEN if see.safe[n] else 0
         see.kept[n] = 0.0 if see.safe[n] else see.scan[n]
         if found and see.filtered[n] < see.scan[n]:
             see.scan[n] = see.kept[n] = see.filtered[n]
-            see.unseen[n] = see.narrow[n]
+            see.unseen[n] += see.narrow[n]
 
 
 @jit_inner
