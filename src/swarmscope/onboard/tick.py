@@ -9,6 +9,7 @@ from swarmscope._jit import jit, jit_paste
 from swarmscope.onboard.control.guard import guard
 from swarmscope.onboard.perception.bearings import steady
 from swarmscope.onboard.perception.clock import keep_time
+from swarmscope.onboard.perception.faulty import leave_out_faulty
 from swarmscope.onboard.perception.features import align_features, extrema
 from swarmscope.onboard.perception.filters import filter_padded, prepare_scan
 from swarmscope.onboard.perception.frames import keep_frame, look_back
@@ -35,6 +36,7 @@ def perceive(see: View, still_s: float) -> None:
     dx, dy = update_odometry(see.percept, see.shared)
     read_inbox(see)
     update_tracks(see.percept, see.shared, see.rig, dx, dy)
+    leave_out_faulty(see.scan, see.misses, see.rig)
     move_on(see)
     if see.rig.sensor.field > 0:
         look_back(see)

@@ -53,6 +53,8 @@ class View(NamedTuple):
     """(M,) float32: the scan of the last tick with what it had lost; 0 = there was none."""
     unseen: np.ndarray
     """(M,) uint8: for how many ticks what is kept there has not been seen, plus GUARD_ALONE and BROKEN."""
+    misses: np.ndarray
+    """(M,) uint8: how often each beam has missed what the beams beside it saw, since it last saw something."""
     frames: Frames
     masked: np.ndarray
     """(M,) float32: the scan without moving neighbours."""
@@ -91,6 +93,7 @@ class Swarm(NamedTuple):
     scans: np.ndarray
     kept: np.ndarray
     unseen: np.ndarray
+    misses: np.ndarray
     frames: Frames
     masked: np.ndarray
     safe: np.ndarray
@@ -123,6 +126,7 @@ def new_swarm(robots: int, rig: Rig) -> Swarm:
         scans=np.full((robots, beams), np.inf, np.float32),
         kept=np.zeros((robots, beams), np.float32),
         unseen=np.zeros((robots, beams), np.uint8),
+        misses=np.zeros((robots, beams), np.uint8),
         frames=Frames(np.zeros((robots, frames, field), np.float32), np.zeros((robots, frames, POSE))),
         masked=np.zeros((robots, beams), np.float32),
         safe=np.zeros((robots, beams), np.uint8),
@@ -148,6 +152,7 @@ def view_of(swarm: Swarm, i: int) -> View:
         swarm.scans[i],
         swarm.kept[i],
         swarm.unseen[i],
+        swarm.misses[i],
         Frames(swarm.frames.scans[i], swarm.frames.poses[i]),
         swarm.masked[i],
         swarm.safe[i],

@@ -115,10 +115,8 @@ def blanks(planner: Planner, swarm: Swarm, memory: np.ndarray, faults: Faults) -
     decision = np.zeros(1, DECISION)
     decision["p_self"] = decision["p_left"] = np.nan
     decision["state"], decision["reason"] = YIELD, R_BLOCKED_WAIT
-    pairs = (
-        (memory, planner.new_memory(len(memory))), (swarm.shared, new_shared(1)), (swarm.decisions, decision),
-        (swarm.kept, np.zeros_like(swarm.kept[:1])), (swarm.unseen, np.zeros_like(swarm.unseen[:1])),
-    )  # fmt: skip
+    pairs = [(memory, planner.new_memory(len(memory))), (swarm.shared, new_shared(1)), (swarm.decisions, decision)]
+    pairs += [(rows, np.zeros_like(rows[:1])) for rows in (swarm.kept, swarm.unseen, swarm.misses)]
     return [(_bytes_of(rows), _bytes_of(blank)) for rows, blank in pairs]
 
 

@@ -127,7 +127,9 @@ def _place_of(see: View, n: int) -> tuple[float, float, int]:
             lost_by = k
         elif see.scan[k] < distance + SAME_M or abs(between - beam) < THROUGH:
             return x, y, -1
-    if lost_by < 0 or not distance >= least_range(rig) or (rig.sensor.field > 0 and not in_view(x, y, see)):
+    if lost_by < 0 or not least_range(rig) <= distance < WITHIN * rig.sensor.range_max:
+        return x, y, -1
+    if rig.sensor.field > 0 and not in_view(x, y, see):
         return x, y, -1
     if was_near_track(percept, see.shared, x, y, rig):
         return x, y, -1

@@ -1,0 +1,57 @@
+"""Beams that see nothing: one that says nothing wherever the beams beside it see a surface is taken as broken."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from swarmscope._jit import jit, jit_inner
+from swarmscope.onboard.rig import Rig
+
+PATIENCE = 4
+"""A beam that has missed a surface so often, and seen nothing since then, is broken."""
+TOGETHER = 3
+"""So many beams side by side may be broken and still be noticed."""
+ALIKE = 0.25
+"""Two returns that differ by less than this share are of one surface."""
+WITHIN = 0.9
+"""Surfaces beyond this share of the range are not counted on."""
+
+
+@jit
+def leave_out_faulty(scan: np.ndarray, misses: np.ndarray, rig: Rig) -> None:
+    """Write NaN over what faulty beams of ``scan (M,)`` [m] say; keep up how often each of them has missed something.
+
+    ``misses (M,)`` uint8. A surface seen on both sides of up to `TOGETHER` silent beams was missed by them.
+    """
+    sensor = rig.sensor
+    first, last = (sensor.first, sensor.first + sensor.field - 1) if sensor.field > 0 else (0, sensor.beams - 1)
+    before = _last_before_the_first(scan, rig)
+    for n in range(first, last + 1):
+        if not scan[n] < sensor.range_max:
+            continue
+        misses[n] = 0
+        if 1 < n - before <= TOGETHER + 1 and _one_surface(scan[before], scan[n], rig):
+            for k in range(before + 1, n):
+                misses[k % scan.size] = min(255, misses[k % scan.size] + 1)
+        before = n
+    for n in range(first, last + 1):
+        if misses[n] >= PATIENCE:
+            scan[n] = math.nan
+
+
+@jit_inner
+def _last_before_the_first(scan: np.ndarray, rig: Rig) -> int:
+    """Return the number, below 0, of the last beam that has seen something, far below 0 where the circle is open."""
+    if rig.sensor.field == 0 and rig.sensor.wraps:
+        for k in range(1, min(TOGETHER + 1, scan.size) + 1):
+            if scan[scan.size - k] < rig.sensor.range_max:
+                return -k
+    return -2 * scan.size
+
+
+@jit_inner
+def _one_surface(a: float, b: float, rig: Rig) -> bool:
+    """Tell whether two returns may be of one surface that is near enough to be seen in between."""
+    return bool(max(a, b) < WITHIN * rig.sensor.range_max and abs(a - b) < ALIKE * min(a, b))
