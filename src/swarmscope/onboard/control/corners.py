@@ -42,15 +42,17 @@ def out_of_hidden_halves(see: View, n: int, way: Way, met: float) -> bool:
 
 @jit_inline
 def apart_round(rig: Rig) -> float:
-    """Return how far two robots are apart at least, measured round a corner that both keep off, while they are not
-    closer than their clearance [m]: bodies that touch lie on the circle that both keep off."""
+    """Return from which distance on two robots do not touch, measured round a corner that both keep off [m].
+
+    Bodies that touch lie at the ends of a chord of the circle that both keep off.
+    """
     keeps = rig.body.radius_m + rig.guarding.clearance_m
-    return 2.0 * keeps * math.asin(rig.body.radius_m / keeps) + rig.guarding.clearance_m
+    return 2.0 * keeps * math.asin(rig.body.radius_m / keeps)
 
 
 @jit_inner
 def _opens(ranges: np.ndarray, n: int, side: int, rig: Rig) -> bool:
-    """Tell whether a robot fits between the return of beam n and that of the next one on a side, which is farther."""
+    """Tell whether a robot has room between the return of beam n and that of the next one on a side, farther away."""
     m = _beam(n + side, rig)
     if m < 0 or not ranges[m] > ranges[n]:
         return False
@@ -59,7 +61,8 @@ def _opens(ranges: np.ndarray, n: int, side: int, rig: Rig) -> bool:
         return True
     near = ranges[n] * (1.0 - SIGMAS * rig.sensor.range_sigma)
     gap2 = near * near + far * far - 2.0 * near * far * math.cos(rig.sensor.increment)
-    return bool(gap2 >= 4.0 * rig.body.radius_m * rig.body.radius_m)
+    room = rig.body.radius_m + rig.guarding.clearance_m
+    return bool(gap2 >= 4.0 * room * room)
 
 
 @jit_inner
