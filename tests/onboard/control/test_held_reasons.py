@@ -88,15 +88,15 @@ def test_another_robot_in_the_way():
 
 
 def corner():
-    """An open scan with one return 0.25 m away, 60 degrees to the left: 0.22 m beside the way straight ahead."""
+    """An open scan with something round 0.25 m away, from 60 degrees to the left on: a robot has room behind it."""
     scan = OPEN.copy()
-    scan[180 + 60] = 0.25
+    scan[180 + 60 : 180 + 150] = 0.25
     return scan
 
 
 def test_somebody_who_may_come_round_a_corner():
-    """Others that do not yield make 0.1 m in a tick: 9 cm are left between body and corner."""
-    rows = one_robot(rig_of(others_yield=False))
+    """Others that do not yield make 0.4 m in a tick: less is left of the way round the corner."""
+    rows = one_robot(rig_of(others_yield=False, others_mps=2.0))
     assert asked(rows, scan=corner()) == (0.0, 0.0, R_HELD_CORNER)
 
 
@@ -110,7 +110,7 @@ def test_where_no_robot_fits_behind_it_is_no_corner():
     """Of 34 cm, two radii and two clearances, there are only 25 beside it."""
     scan = np.full(360, 0.5, np.float32)
     scan[180 + 60] = 0.25
-    v, _, reason = asked(one_robot(rig_of(others_yield=False)), scan=scan)
+    v, _, reason = asked(one_robot(rig_of(others_yield=False, others_mps=2.0)), scan=scan)
     assert v > 0.0 and reason == R_FREE
 
 

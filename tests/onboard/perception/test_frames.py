@@ -175,7 +175,7 @@ def test_nobody_knows_what_a_wide_hole_hides():
     robot.look({59: 2.0, 60: NAN, 61: NAN, 62: 3.0} | {-d: NAN for d in range(30, 90)})
     scan = robot.view.frames.scans[0]
     assert scan[[149, 150, 151, 152]] == pytest.approx([2.0, -2.0, -2.0, 3.0])
-    assert np.isnan(scan[1:61]).all() and np.isinf(scan[[0, 61]]).all()
+    assert np.isnan(scan[1:61]).all() and (scan[[0, 61]] == 5.0).all()
     robot.look({}, (2.0, 0.0, 0.0))
     a = SIXTY
     assert robot.free(1.9 * math.cos(a) - 2.0, 1.9 * math.sin(a))
@@ -217,7 +217,7 @@ def test_back_at_a_place_its_scan_is_renewed():
     robot.look({}, (-0.09, 0.0, 0.0))
     assert (robot.kept, robot.newest) == (2, 0)
     assert not robot.view.frames.poses[0].any()
-    assert np.isinf(robot.view.frames.scans[0]).all()
+    assert (robot.view.frames.scans[0] == 5.0).all()
 
 
 def test_when_there_is_no_room_the_oldest_gives_way():
@@ -238,3 +238,13 @@ def test_narrow_views_keep_more_scans(beams, fov, room):
 
 def test_a_full_circle_keeps_none():
     assert one_robot().view.frames.scans.size == 0
+
+
+def test_beyond_the_range_nothing_was_seen_free():
+    """The range is 5 m: a scan without returns shows what is in view up to there, and not what lies behind it."""
+    robot = Robot()
+    robot.look({}, (0.0, 0.0, 0.0))
+    robot.look({}, (0.0, 0.0, math.pi))
+    robot.look({}, (0.0, 0.0, 0.0))
+    assert robot.free(-4.9, 0.0)
+    assert not robot.free(-5.1, 0.0)

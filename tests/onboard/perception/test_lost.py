@@ -199,6 +199,14 @@ def test_what_left_the_range_is_not_blindness():
     assert (rows.shared["blind_s"], rows.shared["losses"]) == (0.0, 0.0)
 
 
+def test_what_a_long_step_leaves_behind_out_of_range_is_not_blindness():
+    """At 4.4 m of 5, and 1 m farther away at the next scan."""
+    rows = one_robot()
+    given(rows, scan_of(**{f"at_{n}": 4.4 for n in range(170, 190)}))
+    given(rows, scan_of(), (-1.0, 0.0, 0.0))
+    assert (rows.shared["blind_s"], rows.shared["losses"]) == (0.0, 0.0)
+
+
 def test_a_broken_beam_has_not_passed_the_place_where_something_was():
     wall = np.full(360, 3.0, np.float32)
     wall[AHEAD] = 0.5

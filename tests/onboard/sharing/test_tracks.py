@@ -11,7 +11,14 @@ from hypothesis import strategies as st
 
 from helpers import DT, circles_world, make_sensor, one_robot, rig_of, scan_at, seen
 from swarmscope.onboard.percept import PEERS
-from swarmscope.onboard.sharing.tracks import mask_moving_neighbours, update_odometry, update_tracks
+from swarmscope.onboard.rig import SIGMAS
+from swarmscope.onboard.sharing.tracks import (
+    gains,
+    mask_moving_neighbours,
+    near_track,
+    update_odometry,
+    update_tracks,
+)
 from swarmscope.sim.lidar import make_beams
 
 STILL_S = 0.6
@@ -216,3 +223,38 @@ def test_masks_at_the_border_of_a_limited_field_of_view(fov_deg):
         watcher.watch({7: (x, y, 0.0)})
         assert np.isinf(watcher.mask(neighbour_scan(rig, [(x, y)]))).all()
     assert make_beams(121, math.radians(fov_deg), 5.0).wraps is False
+
+
+@pytest.mark.parametrize("speed", [0.2, 0.5])
+def test_two_observations_are_enough_for_a_line_however_positioning_errs(speed):
+    watcher = Watcher(rig_of(sensor=make_sensor(position_sigma=0.05)))
+    for k in range(4):
+        watcher.watch({7: (2.0, speed * DT * k, 0.0)})
+        if k > 0:
+            place, velocity, _ = watcher.track(7)
+            np.testing.assert_allclose(place, (2.0, speed * DT * k), atol=1e-9)
+            np.testing.assert_allclose(velocity, (0.0, speed), atol=1e-9)
+
+
+def test_one_that_comes_into_view_again_is_where_it_is_seen():
+    watcher = Watcher(rig_of(sensor=make_sensor(position_sigma=0.05)))
+    for k in range(6):
+        watcher.watch({7: (2.0, 0.1 * k, 0.0)})
+    for _ in range(4):
+        watcher.watch({})
+    watcher.watch({7: (1.5, 0.0, 0.0)})
+    np.testing.assert_allclose(watcher.track(7)[0], (1.5, 0.0), atol=1e-9)
+
+
+@pytest.mark.parametrize(("index", "alpha", "beta"), [(1e-9, 0.0, 0.0), (1.0, 0.75, 0.5), (1e9, 1.0, 2.0)])
+def test_gains_suit_the_tracking_index(index, alpha, beta):
+    """Kalata's relation: index^2 = beta^2 / (1 - alpha); at index 1 the root is 1/2."""
+    found = gains(255, 1.0 / SIGMAS, index)
+    assert found == pytest.approx((max(alpha, 1018 / 65280), max(beta, 6 / 65280)), abs=1e-3)
+
+
+def test_a_return_where_a_neighbour_is_seen_is_its_own_however_far_its_track_lags():
+    rows = one_robot(rig_of(sensor=make_sensor(position_sigma=0.03)))
+    rows.see([seen(7, 1.0, 0.5)])
+    assert near_track(rows.percept, rows.shared, 1.0, 0.4, rows.rig)
+    assert not near_track(rows.percept, rows.shared, 2.0, 0.4, rows.rig)

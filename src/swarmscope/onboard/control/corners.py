@@ -41,12 +41,18 @@ def out_of_hidden_halves(see: View, n: int, way: Way, met: float) -> bool:
 
 
 @jit_inline
+def _kept_off(rig: Rig) -> float:
+    """Return what the centres of robots keep off a corner [m]: those that do not yield may rub against it."""
+    return rig.body.radius_m + (rig.guarding.clearance_m if rig.guarding.others_yield else 0.0)
+
+
+@jit_inline
 def apart_round(rig: Rig) -> float:
     """Return from which distance on two robots do not touch, measured round a corner that both keep off [m].
 
     Bodies that touch lie at the ends of a chord of the circle that both keep off.
     """
-    keeps = rig.body.radius_m + rig.guarding.clearance_m
+    keeps = _kept_off(rig)
     return 2.0 * keeps * math.asin(rig.body.radius_m / keeps)
 
 
@@ -74,10 +80,10 @@ def _clear_past(see: View, n: int, side: int, way: Way, met: float) -> bool:
     rig, radius = see.rig, see.rig.body.radius_m
     if not _opens(see.scan, n, side, rig):
         return True
-    keeps, touch = radius + rig.guarding.clearance_m, apart_round(rig)
+    keeps, touch = _kept_off(rig), apart_round(rig)
     most = math.sqrt(way.x5 * way.x5 + way.y5 * way.y5) + way.brake
     enough = touch + max(2.0 * most, most + met)
-    along = _hidden_at(see.scan, n, side, enough, rig)
+    along = hidden_at(see.scan, n, side, enough, rig)
     if along >= enough:
         return True
     c, s = _direction(n + side, rig)
@@ -85,9 +91,9 @@ def _clear_past(see: View, n: int, side: int, way: Way, met: float) -> bool:
     near = see.scan[n] * max(0.5, 1.0 - SIGMAS * rig.sensor.range_sigma)
     corner = Corner(c, s, float(side), near * math.cos(turned), near * abs(math.sin(turned)), keeps)
     along = max(along, corner.x + keeps)  # there it is the shortest way
-    now = _way_round(0.0, 0.0, along, radius, corner)
-    moved = now - _way_round(way.x4, way.y4, along, radius, corner)
-    stopped = now - _way_round(way.x5, way.y5, along, radius, corner)
+    now = way_round(0.0, 0.0, along, radius, corner)
+    moved = now - way_round(way.x4, way.y4, along, radius, corner)
+    stopped = now - way_round(way.x5, way.y5, along, radius, corner)
     towards = max(moved, stopped)
     if towards <= 1e-6:
         return True
@@ -96,8 +102,8 @@ def _clear_past(see: View, n: int, side: int, way: Way, met: float) -> bool:
     return towards + met <= now - touch
 
 
-@jit_inner
-def _way_round(qx: float, qy: float, along: float, beside: float, corner: Corner) -> float:
+@jit
+def way_round(qx: float, qy: float, along: float, beside: float, corner: Corner) -> float:
     """Return how far it is from (qx, qy), body frame, round a corner to a place behind it [m]."""
     x = qx * corner.c + qy * corner.s - corner.x
     y = corner.side * (qx * corner.s - qy * corner.c) - corner.y
@@ -115,8 +121,8 @@ def _way_round(qx: float, qy: float, along: float, beside: float, corner: Corner
     return math.sqrt(d * d - near * near) + math.sqrt(e * e - near * near) + near * arc
 
 
-@jit_inner
-def _hidden_at(ranges: np.ndarray, n: int, side: int, enough: float, rig: Rig) -> float:
+@jit
+def hidden_at(ranges: np.ndarray, n: int, side: int, enough: float, rig: Rig) -> float:
     """Return how far along the line of sight past an edge the centre of a body is that touches it and is hidden [m].
 
     Beams that the body would cross have to end before it. Beyond ``enough`` [m] it does not matter.

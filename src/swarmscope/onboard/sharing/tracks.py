@@ -71,7 +71,7 @@ def update_tracks(percept: Row, shared: Row, rig: Rig, dx: float, dy: float) -> 
             elapsed = max(now - shared["track_seen_s"][t], 1e-6)
             seen = 2 if elapsed > 1.5 * dt else min(255, shared["track_n"][t] + 1)
             error = rig.sensor.position_sigma * math.sqrt(x * x + y * y)
-            alpha, beta = _gains(seen, error, rig.body.a_max_mps2 * elapsed * elapsed)
+            alpha, beta = gains(seen, error, rig.body.a_max_mps2 * elapsed * elapsed)
             ex, ey = x - shared["track_x"][t], y - shared["track_y"][t]
             shared["track_x"][t] += alpha * ex
             shared["track_y"][t] += alpha * ey
@@ -83,8 +83,8 @@ def update_tracks(percept: Row, shared: Row, rig: Rig, dx: float, dy: float) -> 
     _limit_speed_and_anchor(shared, rig, now)
 
 
-@jit_inner
-def _gains(seen: int, error: float, swerve: float) -> tuple[float, float]:
+@jit
+def gains(seen: int, error: float, swerve: float) -> tuple[float, float]:
     """Return alpha and beta for the observation number ``seen`` of a track.
 
     ``error`` [m] of the observation, ``swerve`` [m]: how far speeding up leads off in the time between two. In the
@@ -94,7 +94,7 @@ def _gains(seen: int, error: float, swerve: float) -> tuple[float, float]:
     if error <= 0.0:
         return EXACT
     index = swerve / (SIGMAS * error)
-    root = 0.25 * (4.0 + index - math.sqrt(8.0 * index + index * index))
+    root = 4.0 / (4.0 + index + math.sqrt(8.0 * index + index * index))
     alpha = 1.0 - root * root
     beta = 2.0 * (2.0 - alpha) - 4.0 * math.sqrt(1.0 - alpha)
     pairs = seen * (seen + 1.0)
