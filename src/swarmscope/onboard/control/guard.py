@@ -44,14 +44,6 @@ SOME_LOSSES, MOST_LOSSES = 0.2, 0.35
 chance with probability p a share p^3 is lost together with both beams beside them."""
 
 
-class Kept(NamedTuple):
-    """What the centre keeps off returns [m]."""
-
-    distance: float
-    spare: float
-    """What of it is there for errors of ranges."""
-
-
 class Near(NamedTuple):
     """What could matter in this tick."""
 
@@ -164,11 +156,11 @@ def _near(see: View, speed: float) -> Near:
     body, guarding = rig.body, rig.guarding
     delay = see.percept["dt_s"] + guarding.latency_s
     way, brake = speed * delay, speed * speed / (2.0 * body.a_max_mps2)
-    limit = body.radius_m + guarding.clearance_m + way + brake
+    limit = body.radius_m + guarding.clearance_m + _bulge(speed, body.w_max_radps, see) + way + brake
     if guarding.others_mps > 0.0:
         stranger = 0.0 if guarding.others_yield else guarding.others_mps * (delay + speed / body.a_max_mps2)
         limit = max(limit, apart_round(rig) - body.radius_m + way + brake) + max(way + 3.0 * brake, stranger)
-    limit /= max(0.5, 1.0 - SIGMAS * rig.sensor.range_sigma)
+    limit /= max(0.5, 1.0 - SIGMAS * rig.sensor.range_sigma - rig.sensor.increment)
     least = least_range(rig)
     count = 0
     nearest = math.inf
@@ -196,16 +188,17 @@ def _held_by(see: View, v: float, w: float, near: Near) -> int:
     met = met_by(v, percept["dt_s"], rig)
     if not alone and not _clear_of_tracks(see, way, met):
         return R_HELD_ROBOT
-    kept = _distance_kept(v, w, see)
+    bulge = _bulge(v, w, see)
     for k in range(near.beams):
-        held = _held_by_beam(see, see.edges[k], way, met, kept)
+        held = _held_by_beam(see, see.edges[k], way, met, bulge)
         if held == R_HELD_THING and rig.sensor.field > 0 and is_blurred(see, see.edges[k]):
             see.shared["unseen_left"] = rig.sin[see.edges[k]] > 0.0
             return R_HELD_UNSEEN
         if held != FREE:
             return held
     if rig.sensor.field > 0:
-        x, y = out_of_sight(see, way, min(kept.distance, near.nearest - 1e-6))
+        kept, _ = _kept_from(rig.body.radius_m, bulge, rig)
+        x, y = out_of_sight(see, way, min(kept, near.nearest - 1e-6))
         if x != 0.0 or y != 0.0:
             see.shared["unseen_left"] = y > 0.0
             return R_HELD_UNSEEN
@@ -213,35 +206,34 @@ def _held_by(see: View, v: float, w: float, near: Near) -> int:
 
 
 @jit_inline
-def _distance_kept(v: float, w: float, see: View) -> Kept:
-    """Return how far the centre keeps off returns: the clearance covers what is not exact, or it is more than that.
-
-    Something may show between two beams beside the body, and an arc bulges out of the straight pieces drawn for it.
-    """
-    body, step = see.rig.body, see.percept["dt_s"] / STEPS
-    hidden = 0.5 * see.rig.sensor.increment * body.radius_m + ROUNDING_M
-    bulge = 0.125 * max(v, see.percept["speed"]) * abs(w) * step * step
-    kept = max(see.rig.guarding.clearance_m, hidden + bulge)
-    return Kept(body.radius_m + kept, kept - hidden - bulge)
+def _bulge(v: float, w: float, see: View) -> float:
+    """Return how far an arc bulges out of the straight pieces drawn for it, ranges and motion rounded [m]."""
+    step = see.percept["dt_s"] / STEPS
+    return ROUNDING_M + 0.125 * max(v, see.percept["speed"]) * abs(w) * step * step
 
 
 @jit_inline
-def _at_least(s: float, spare: float, rig: Rig) -> float:
-    """Return how near the return of range s may be [m], less what the clearance has to spare for that."""
-    return s - max(0.0, SIGMAS * rig.sensor.range_sigma * s - spare)
+def _kept_from(s: float, bulge: float, rig: Rig) -> tuple[float, float]:
+    """Return how far the centre keeps off what the return of range ``s`` belongs to, and how near that may be [m].
+
+    The clearance covers what is not exact, or it is more than that: the thing may reach as far as the next beam, where
+    it does not show, and the range may err.
+    """
+    spare = rig.guarding.clearance_m - rig.sensor.increment * s - bulge
+    nearest = s - max(0.0, SIGMAS * rig.sensor.range_sigma * s - max(0.0, spare))
+    return rig.body.radius_m + rig.guarding.clearance_m + max(0.0, -spare), nearest
 
 
 @jit_inner
-def _held_by_beam(see: View, n: int, way: Way, met: float, kept: Kept) -> int:
+def _held_by_beam(see: View, n: int, way: Way, met: float, bulge: float) -> int:
     """Return how the return of beam n, or who may come out from behind it, forbids a way: FREE, or the reason."""
     rig, percept, s = see.rig, see.percept, see.scan[n]
-    if s >= least_range(rig):
-        s = _at_least(s, kept.spare, rig)
-    else:
+    if not s >= least_range(rig):
         s = body_and_clearance(rig)
+    kept, s = _kept_from(s, bulge, rig)
     if see.unseen[n] & BROKEN:
         s = min(s, _through_hole(see, n))
-    need = min(kept.distance, s - 1e-6)  # already too close: never closer
+    need = min(kept, s - 1e-6)  # already too close: never closer
     px, py = s * rig.cos[n], s * rig.sin[n]
     if closer(px, py, way, need) or (way.turns and shadowed(px, py, rig.cos[n], rig.sin[n], way, need)):
         return R_HELD_THING

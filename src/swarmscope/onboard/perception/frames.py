@@ -101,10 +101,13 @@ def is_blurred(see: View, n: int) -> bool:
 
 @jit_inner
 def _draw(see: View, scan: np.ndarray, pose: np.ndarray) -> None:
-    """Lower the beams out of view to what a kept scan shows there."""
+    """Lower the beams out of view to what a kept scan shows there.
+
+    It may reach to the next beam of that scan, which the clearance may cover.
+    """
     sensor, first, last = see.rig.sensor, see.shared["view_first"], see.shared["view_last"]
     c, si = math.cos(pose[2]), math.sin(pose[2])
-    least = least_range(see.rig)
+    least, clearance = least_range(see.rig), see.rig.guarding.clearance_m
     px, py, far = pose[0], pose[1], sensor.range_max
     ax, ay, bx, by = see.rig.cos[first], see.rig.sin[first], see.rig.cos[last], see.rig.sin[last]
     narrow = (last - first) * sensor.increment < math.pi
@@ -121,7 +124,7 @@ def _draw(see: View, scan: np.ndarray, pose: np.ndarray) -> None:
         if first <= n <= last:
             continue
         distance = math.sqrt(x * x + y * y)
-        distance -= _astray(pose, distance, see.rig)
+        distance -= _astray(pose, distance, see.rig) + max(0.0, s * sensor.increment - clearance)
         see.scan[n] = min(see.scan[n], max(distance, least))
 
 
