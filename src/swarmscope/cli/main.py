@@ -212,7 +212,7 @@ def storm(
         list[str] | None, typer.Option(help="Planner or FILE.py, else all without training; repeatable.")
     ] = None,
     covered: Annotated[
-        bool, typer.Option("--covered", help="Leave out what storms are known to break (docs/storms.md).")
+        bool, typer.Option("--covered", help="Leave out sensors that say free where something stands.")
     ] = False,
     replay: Annotated[
         str | None, typer.Option(metavar="SEED:NUMBER or FILE", help="Play this one run instead, or a breach's file.")

@@ -6,7 +6,6 @@ things in nearly every run) and ``noise.scan_age_s`` (turning between scan and d
 
 from __future__ import annotations
 
-import math
 from typing import Final, NamedTuple
 
 
@@ -124,13 +123,6 @@ STOOD_S: Final = 60.0
 TRIES: Final = 400
 """Draws before a number is given up."""
 
-OPEN: Final[dict[str, Span | None]] = {
-    "guard.clearance_m": None,
-    "noise.dropout": None,
-    "noise.nan": None,
-    "noise.stuck": None,
-    "robot.a_max_mps2": Span(1.0, math.inf),
-    "lidar.rate_hz": Span(4.0, math.inf),
-}
-"""Keys with which storms have found contacts (docs/storms.md), and the span in which they have not; None: the default
+OPEN: Final[dict[str, Span | None]] = {"noise.dropout": None, "noise.stuck": None}
+"""Keys that say free where something stands, and the span in which that is covered (docs/safety.md); None: the default
 only. ``--covered`` keeps what is drawn within these."""

@@ -21,6 +21,7 @@ from swarmscope.onboard.control.unseen import look_round, out_of_sight
 from swarmscope.onboard.control.way import STEPS, Way, closer, shadowed, way_of
 from swarmscope.onboard.percept import MAX_NEIGHBOURS, PEERS, Row
 from swarmscope.onboard.perception.frames import is_blurred
+from swarmscope.onboard.perception.holes import nothing_up_to
 from swarmscope.onboard.perception.mend import body_and_clearance, least_range
 from swarmscope.onboard.reasons import (
     R_HELD_BLIND,
@@ -232,7 +233,7 @@ def _held_by_beam(see: View, n: int, way: Way, met: float, bulge: float) -> int:
         s = body_and_clearance(rig)
     kept, s = _kept_from(s, bulge, rig)
     if see.unseen[n] & BROKEN:
-        s = min(s, _through_hole(see, n))
+        s = min(s, nothing_up_to(see, n))
     need = min(kept, s - 1e-6)  # already too close: never closer
     px, py = s * rig.cos[n], s * rig.sin[n]
     if closer(px, py, way, need) or (way.turns and shadowed(px, py, rig.cos[n], rig.sin[n], way, need)):
@@ -243,20 +244,6 @@ def _held_by_beam(see: View, n: int, way: Way, met: float, bulge: float) -> int:
     if may_be_a_robot and not in_own_half(px, py, s, way, met, rig):
         return R_HELD_ROBOT
     return FREE if out_of_hidden_halves(see, n, way, met) else R_HELD_CORNER
-
-
-@jit_inner
-def _through_hole(see: View, n: int) -> float:
-    """Return up to which range nothing can stand in the hole that beam n is in [m]: it would show beside it."""
-    total, wraps = see.rig.sensor.beams, see.rig.sensor.wraps
-    width = 2
-    for step in (1, -1):
-        k = n + step
-        while 0 <= (k % total if wraps else k) < total and see.unseen[k % total] & BROKEN and width < total:
-            width += 1
-            k += step
-    half = 0.5 * width * see.rig.sensor.increment
-    return 0.5 * see.rig.guarding.thinnest_m / math.sin(half) if half < 0.5 * math.pi else 0.0
 
 
 @jit_inline

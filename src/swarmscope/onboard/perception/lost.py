@@ -12,6 +12,7 @@ import math
 from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.onboard.percept import Row
 from swarmscope.onboard.perception.frames import in_view
+from swarmscope.onboard.perception.holes import LOOKED_THROUGH, find_looked_through
 from swarmscope.onboard.perception.mend import least_range
 from swarmscope.onboard.sharing.tracks import was_near_track
 from swarmscope.onboard.view import BROKEN, GUARD_ALONE, View
@@ -44,9 +45,13 @@ def keep_lost(see: View, broken: int) -> None:
         most = min(float(MOST_TICKS), rig.guarding.lost_s / percept["dt_s"])
         lost, found = _find_lost(see, int(most + 0.5))
     _note_losses(percept, see.shared, seen, lost)
+    if broken > 0:
+        find_looked_through(see)
     for n in range(rig.sensor.beams):
-        see.unseen[n] = BROKEN if see.safe[n] else 0
-        see.kept[n] = 0.0 if see.safe[n] else see.scan[n]
+        see.unseen[n] = BROKEN if see.safe[n] == 1 else 0
+        see.kept[n] = see.scan[n]
+        if see.safe[n]:
+            see.kept[n] = math.inf if see.safe[n] == LOOKED_THROUGH else 0.0
         if found and see.filtered[n] < see.scan[n]:
             see.scan[n] = see.kept[n] = see.filtered[n]
             see.unseen[n] += see.narrow[n]
