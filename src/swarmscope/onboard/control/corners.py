@@ -129,7 +129,7 @@ def hidden_at(ranges: np.ndarray, n: int, side: int, enough: float, rig: Rig) ->
     """
     radius, increment = rig.body.radius_m, rig.sensor.increment
     nearer = max(0.5, 1.0 - SIGMAS * rig.sensor.range_sigma)
-    along = nearer * ranges[n]
+    along: float = nearer * ranges[n]
     k = 1
     while along < enough and k < rig.sensor.beams:
         psi = k * increment

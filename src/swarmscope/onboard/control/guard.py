@@ -209,8 +209,9 @@ def _held_by(see: View, v: float, w: float, near: Near) -> int:
 @jit_inline
 def _bulge(v: float, w: float, see: View) -> float:
     """Return how far an arc bulges out of the straight pieces drawn for it, ranges and motion rounded [m]."""
-    step = see.percept["dt_s"] / STEPS
-    return ROUNDING_M + 0.125 * max(v, see.percept["speed"]) * abs(w) * step * step
+    step: float = see.percept["dt_s"] / STEPS
+    speed: float = see.percept["speed"]
+    return ROUNDING_M + 0.125 * max(v, speed) * abs(w) * step * step
 
 
 @jit_inline
