@@ -110,7 +110,7 @@ def test_every_key_changes_a_run_the_same_way_for_any_number_of_threads(key):
 
 @pytest.mark.parametrize("key", MODERATE)
 def test_nobody_is_touched_in_the_forest(key):
-    trace = run_scenario(T1 | {"seed": 1, "record_scans": "no", "limit_s": 60.0} | grouped({key: MODERATE[key]}))
+    trace = run_scenario(T1 | {"seed": 1, "record_scans": "no", "limit_s": 75.0} | grouped({key: MODERATE[key]}))
     assert not trace.robots["crashed"].any()
     assert trace.robots["arrived"].mean() > 0.8
 

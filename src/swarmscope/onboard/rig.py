@@ -80,6 +80,10 @@ MOST_LEVELS = 32
 """Levels of speed, 5 kB of tables each."""
 LEAST_MPS = 0.01
 """Margins of a robot that stands."""
+ROUNDING_M = 0.0005
+"""Of ranges and of motion."""
+MOST_BESIDE = 0.75
+"""Beams farther apart than so many rad make no difference any more."""
 ROUNDING = 1.000001
 """A speed that is above a level by less than this factor belongs to it."""
 GUARDING, SAFETY, SHARING = Guarding(), Safety(), Sharing()
@@ -124,13 +128,14 @@ def make_rig(
     body = Body(*(float(v) for v in body))
     protection = protection_model(body)
     angles = sensor.angle_min + sensor.increment * np.arange(sensor.beams)
-    footprint = body.radius_m + guarding.footprint_clearance_m
+    beside = keeps_beside(body, sensor)
+    footprint = max(body.radius_m + guarding.footprint_clearance_m, beside)
     half = window_half(protection.alpha, sensor.increment)
     slower = _slower(body, safety)
     levels = [protection_model(one) for one in slower]
     reach = [
         [reach_table(sensor.increment, sensor.range_max, footprint, rule) for rule in rules]
-        for rules in (_rules(body, level, protection, safety) for level in levels)
+        for rules in (_rules(body.radius_m, level, protection, safety, beside) for level in levels)
     ]
     return Rig(
         body=body,
@@ -186,12 +191,22 @@ def _resolved(guarding: Guarding, body: Body) -> Guarding:
     return Guarding(*lengths, float(others), bool(guarding.others_yield))  # type: ignore[call-arg, arg-type]
 
 
-def _rules(body: Body, margins: Protection, fastest: Protection, safety: Safety) -> tuple[Rule, ...]:
+def keeps_beside(body: Body, sensor: Sensor) -> float:
+    """Return how near a robot may pass by a return, for the thing may reach as far as the next beam [m].
+
+    With few beams that is more than any margin: directions that the guard does not allow must not seem free.
+    """
+    return (body.radius_m + ROUNDING_M) / (1.0 - min(MOST_BESIDE, sensor.increment))
+
+
+def _rules(
+    radius: float, margins: Protection, fastest: Protection, safety: Safety, beside: float
+) -> tuple[Rule, ...]:
     """Return the rules AHEAD to FITS at a level of speed; features keep one mask, that of the top speed."""
     r, l_th, half_alpha = margins.r, margins.l_th, 0.5 * margins.alpha
     sector = half_alpha if safety.sector else 0.0
     return (
-        Rule(l_th, sector, safety.look_ahead_m, body.radius_m + safety.margin_m),
+        Rule(l_th, sector, safety.look_ahead_m, max(radius + safety.margin_m, beside)),
         Rule(safety.narrow_m or r),
         Rule(r),
         Rule(fastest.l_th, 0.5 * fastest.alpha),

@@ -31,14 +31,12 @@ from swarmscope.onboard.reasons import (
     R_HELD_THING,
     R_HELD_UNSEEN,
 )
-from swarmscope.onboard.rig import SIGMAS, Rig
+from swarmscope.onboard.rig import ROUNDING_M, SIGMAS, Rig
 from swarmscope.onboard.sharing.tracks import near_track, returns_of
 from swarmscope.onboard.view import BROKEN, View
 
 FRACTIONS = (1.0, 0.8, 0.6, 0.4, 0.2, 0.1, 0.05, 0.0)
 FREE = -1
-ROUNDING_M = 0.0005
-"""Of ranges and of motion."""
 STANDS_MPS = 1e-6
 SOME_LOSSES, MOST_LOSSES = 0.2, 0.35
 """Shares of returns lost from scan to scan from which on a robot slows down, and at which it stands. Of beams lost by
@@ -234,7 +232,7 @@ def _held_by_beam(see: View, n: int, way: Way, met: float, bulge: float) -> int:
         s = body_and_clearance(rig)
     kept, s = _kept_from(s, bulge, rig)
     if see.unseen[n] & BROKEN:
-        s = min(s, nothing_up_to(see, n))
+        s = min(s, max(rig.body.radius_m, nothing_up_to(see, n)))
     need = min(kept, s - 1e-6)  # already too close: never closer
     px, py = s * rig.cos[n], s * rig.sin[n]
     if closer(px, py, way, need) or (way.turns and shadowed(px, py, rig.cos[n], rig.sin[n], way, need)):

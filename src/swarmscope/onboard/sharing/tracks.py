@@ -208,7 +208,7 @@ def returns_of(see: View, t: int, hide: bool) -> float:
 def neighbour_reach(distance: float, rig: Rig) -> float:
     """Return how far from a neighbour's estimated centre its returns may lie [m], errors included."""
     noise = rig.sensor.position_sigma + rig.sensor.range_sigma
-    return rig.body.radius_m + 0.06 + SIGMAS * noise * distance
+    return rig.body.radius_m + 0.06 + 2.0 * noise * distance
 
 
 @jit
