@@ -105,7 +105,8 @@ def test_what_the_robot_drives_past_stays_where_it_was():
 def test_what_the_robot_turns_away_from_stays_where_it_was():
     robot = Robot()
     robot.look({-60: 2.0, 30: 4.0})
-    assert robot.look({}, (0.0, 0.0, math.radians(100.0))) == {-160: remembered(2.0)}  # 30 - 100 is in view: nothing is there now
+    turned = robot.look({}, (0.0, 0.0, math.radians(100.0)))
+    assert turned == {-160: remembered(2.0)}  # 30 - 100 is in view: nothing is there now
 
 
 def test_it_is_carried_on_from_tick_to_tick():
