@@ -24,6 +24,8 @@ from swarmscope.sim.world import compile_world
 ROBOTS = 64
 REPEATS = 300
 PUBLISHED_US = 15.9
+REMEMBERED = ("percepts", "shared", "scans", "kept", "unseen", "misses")
+"""What a step changes and the next one would find."""
 
 
 def blocked_scans(robots: int) -> tuple[np.ndarray, np.ndarray]:
@@ -50,9 +52,10 @@ def prepared(robots: int, rig: Rig) -> Swarm:
     percepts, shared = swarm.percepts, swarm.shared
     swarm.scans[:], bearings = blocked_scans(robots)
     rng = np.random.default_rng(2)
-    percepts["now_s"], percepts["dt_s"], percepts["speed"] = 10.0, 0.2, 0.5
+    percepts["dt_s"], percepts["speed"] = 0.2, 0.5
     percepts["goal_bearing"], percepts["goal_distance"] = bearings, 12.0
-    shared["asked_seq"], shared["asked_s"], shared["asked_n"], shared["seq"] = 7, 9.6, 4, 7
+    shared["asked_seq"], shared["asked_s"], shared["asked_n"], shared["seq"] = 7, -0.4, 4, 7
+    shared["asked_id"][:, :4] = range(100, 104)
     for i in range(robots):
         percepts["n_neighbours"][i] = percepts["n_packets"][i] = 4
         for k in range(4):
@@ -76,7 +79,7 @@ def step_us() -> tuple[float, float]:
     decisions = before.decisions
     best = np.inf
     for _ in range(REPEATS):
-        swarm = before._replace(percepts=before.percepts.copy(), shared=before.shared.copy())
+        swarm = before._replace(**{name: getattr(before, name).copy() for name in REMEMBERED})
         memory = planner.new_memory(ROBOTS)
         start = time.perf_counter_ns()
         planner.step_all(0, ROBOTS, swarm, memory, params)

@@ -63,6 +63,14 @@ def test_what_is_near_the_end_of_the_range_may_be_missed():
     assert np.isinf(shown([wall(90, distance=4.8)] * 10)[90])
 
 
+@pytest.mark.parametrize(("beams", "missed"), [(60, False), (120, False), (360, True)])
+def test_a_door_is_no_fault(beams, missed):
+    """Three silent beams of 60 are a gap of 0.8 m at 2 m, of 120 one of 0.4 m, of 360 one of 0.14 m."""
+    scan = np.full(beams, 2.0, np.float32)
+    scan[20:23] = INF
+    assert np.isnan(shown([scan] * 10, rig_of(sensor=make_sensor(beams)))[20:23]).all() == missed
+
+
 def test_one_return_clears_a_beam():
     out = shown([*[wall(90)] * 10, wall(), *[wall(90)] * (PATIENCE - 1)])
     assert np.isinf(out[90])

@@ -23,7 +23,8 @@ WITHIN = 0.9
 def leave_out_faulty(scan: np.ndarray, misses: np.ndarray, rig: Rig) -> None:
     """Write NaN over what faulty beams of ``scan (M,)`` [m] say; keep up how often each of them has missed something.
 
-    ``misses (M,)`` uint8. A surface seen on both sides of up to `TOGETHER` silent beams was missed by them.
+    ``misses (M,)`` uint8. A surface seen on both sides of up to `TOGETHER` silent beams, between which there is no room
+    for the body, was missed by them.
     """
     sensor = rig.sensor
     first, last = (sensor.first, sensor.first + sensor.field - 1) if sensor.field > 0 else (0, sensor.beams - 1)
@@ -32,7 +33,7 @@ def leave_out_faulty(scan: np.ndarray, misses: np.ndarray, rig: Rig) -> None:
         if not scan[n] < sensor.range_max:
             continue
         misses[n] = 0
-        if 1 < n - before <= TOGETHER + 1 and _one_surface(scan[before], scan[n], rig):
+        if 1 < n - before <= TOGETHER + 1 and _one_surface(scan[before], scan[n], n - before, rig):
             for k in range(before + 1, n):
                 misses[k % scan.size] = min(255, misses[k % scan.size] + 1)
         before = n
@@ -52,6 +53,9 @@ def _last_before_the_first(scan: np.ndarray, rig: Rig) -> int:
 
 
 @jit_inner
-def _one_surface(a: float, b: float, rig: Rig) -> bool:
-    """Tell whether two returns may be of one surface that is near enough to be seen in between."""
-    return bool(max(a, b) < WITHIN * rig.sensor.range_max and abs(a - b) < ALIKE * min(a, b))
+def _one_surface(a: float, b: float, apart: int, rig: Rig) -> bool:
+    """Tell whether returns of two beams ``apart`` may be of one surface, near enough to be seen in between."""
+    near, far = min(a, b), max(a, b)
+    if not (far < WITHIN * rig.sensor.range_max and far - near < ALIKE * near):
+        return False
+    return bool(apart * rig.sensor.increment * near < 2.0 * rig.body.radius_m)
