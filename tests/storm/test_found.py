@@ -1,4 +1,4 @@
-"""Runs that storms have found, once with a contact: each is played as in a storm, and nobody is touched any more."""
+"""Runs that storms have found, once with a contact: each is played longer than then, and nobody is touched any more."""
 
 from __future__ import annotations
 
@@ -27,6 +27,5 @@ def case_of(file):
 @pytest.mark.parametrize("file", [case_of(file) for file in sorted(FOUND.glob("*.yaml"))])
 def test_what_a_storm_has_found_touches_nothing_any_more(file):
     case = read_case(file)
-    assert watched(case).breach is None
     longer = max(60.0, LONGER * case.values["limit_s"])
     assert watched(Case(case.values | {"limit_s": longer}, case.forger)).breach is None
