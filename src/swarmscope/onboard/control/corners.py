@@ -12,7 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from swarmscope._jit import jit, jit_inline, jit_inner
+from swarmscope.onboard.control.halves import leaves_half
 from swarmscope.onboard.control.way import Way
+from swarmscope.onboard.perception.beams import beam_at
 from swarmscope.onboard.rig import SIGMAS, Rig
 from swarmscope.onboard.view import View
 
@@ -56,10 +58,16 @@ def apart_round(rig: Rig) -> float:
     return 2.0 * keeps * math.asin(rig.body.radius_m / keeps)
 
 
+@jit_inline
+def _nearer(rig: Rig) -> float:
+    """Return at which share of its range a return may be."""
+    return max(0.5, 1.0 - SIGMAS * rig.sensor.range_sigma)
+
+
 @jit_inner
 def _opens(ranges: np.ndarray, n: int, side: int, rig: Rig) -> bool:
     """Tell whether a robot has room between the return of beam n and that of the next one on a side, farther away."""
-    m = _beam(n + side, rig)
+    m = beam_at(n + side, rig.sensor)
     if m < 0 or not ranges[m] > ranges[n]:
         return False
     far = (1.0 + SIGMAS * rig.sensor.range_sigma) * ranges[m]
@@ -86,20 +94,13 @@ def _clear_past(see: View, n: int, side: int, way: Way, met: float) -> bool:
     along = hidden_at(see.scan, n, side, enough, rig)
     if along >= enough:
         return True
-    c, s = _direction(n + side, rig)
-    turned = side * rig.sensor.increment
-    near = see.scan[n] * max(0.5, 1.0 - SIGMAS * rig.sensor.range_sigma)
-    corner = Corner(c, s, float(side), near * math.cos(turned), near * abs(math.sin(turned)), keeps)
+    m, near, turned = beam_at(n + side, rig.sensor), _nearer(rig) * see.scan[n], rig.sensor.increment
+    corner = Corner(rig.cos[m], rig.sin[m], float(side), near * math.cos(turned), near * math.sin(turned), keeps)
     along = max(along, corner.x + keeps)  # there it is the shortest way
     now = way_round(0.0, 0.0, along, radius, corner)
     moved = now - way_round(way.x4, way.y4, along, radius, corner)
     stopped = now - way_round(way.x5, way.y5, along, radius, corner)
-    towards = max(moved, stopped)
-    if towards <= 1e-6:
-        return True
-    if rig.guarding.others_yield:
-        return towards + max(0.0, stopped - moved) <= 0.5 * (now - touch)
-    return towards + met <= now - touch
+    return leaves_half(moved, stopped, met, now - touch, rig)
 
 
 @jit
@@ -128,7 +129,7 @@ def hidden_at(ranges: np.ndarray, n: int, side: int, enough: float, rig: Rig) ->
     Beams that the body would cross have to end before it. Beyond ``enough`` [m] it does not matter.
     """
     radius, increment = rig.body.radius_m, rig.sensor.increment
-    nearer = max(0.5, 1.0 - SIGMAS * rig.sensor.range_sigma)
+    nearer = _nearer(rig)
     along: float = nearer * ranges[n]
     k = 1
     while along < enough and k < rig.sensor.beams:
@@ -137,7 +138,7 @@ def hidden_at(ranges: np.ndarray, n: int, side: int, enough: float, rig: Rig) ->
         off = along * s - radius * c
         if off >= radius:
             break
-        m = _beam(n + side - side * k, rig)
+        m = beam_at(n + side - side * k, rig.sensor)
         along = max(along, _before(nearer * ranges[m] if m >= 0 else math.inf, c, s, radius))
         k += 1
     return along
@@ -151,19 +152,3 @@ def _before(end: float, c: float, s: float, radius: float) -> float:
     if not end < misses or off >= radius:
         return misses
     return min(misses, end * c + math.sqrt(radius * radius - off * off))
-
-
-@jit_inline
-def _direction(m: int, rig: Rig) -> tuple[float, float]:
-    """Return the direction of a beam that need not be there."""
-    a = rig.sensor.angle_min + m * rig.sensor.increment
-    return math.cos(a), math.sin(a)
-
-
-@jit_inline
-def _beam(n: int, rig: Rig) -> int:
-    """Return the beam of number n, -1 where there is none."""
-    total = rig.sensor.beams
-    if rig.sensor.wraps:
-        return n % total
-    return n if 0 <= n < total else -1

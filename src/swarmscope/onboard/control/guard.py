@@ -232,7 +232,7 @@ def _held_by_beam(see: View, n: int, way: Way, met: float, bulge: float) -> int:
         s = body_and_clearance(rig)
     kept, s = _kept_from(s, bulge, rig)
     if see.unseen[n] & BROKEN:
-        s = min(s, max(rig.body.radius_m, nothing_up_to(see, n)))
+        s = min(s, nothing_up_to(see, n))
     need = min(kept, s - 1e-6)  # already too close: never closer
     px, py = s * rig.cos[n], s * rig.sin[n]
     if closer(px, py, way, need) or (way.turns and shadowed(px, py, rig.cos[n], rig.sin[n], way, need)):

@@ -27,10 +27,18 @@ def in_own_half(px: float, py: float, s: float, way: Way, met: float, rig: Rig) 
     nx, ny = px / s, py / s
     moved = way.x4 * nx + way.y4 * ny
     stopped = way.x5 * nx + way.y5 * ny
+    return leaves_half(moved, stopped, met, s - rig.body.radius_m - rig.guarding.clearance_m, rig)
+
+
+@jit_inline
+def leaves_half(moved: float, stopped: float, met: float, free: float, rig: Rig) -> bool:
+    """Tell whether a way leaves another robot its half of what is ``free`` between the two [m].
+
+    It has come nearer by ``moved`` at the next tick and by ``stopped`` when it stands; ``met`` as in `met_by`.
+    """
     towards = max(moved, stopped)
     if towards <= 1e-6:
         return True
-    free = s - rig.body.radius_m - rig.guarding.clearance_m
     if rig.guarding.others_yield:
         return towards + max(0.0, stopped - moved) <= 0.5 * free
     return towards + met <= free

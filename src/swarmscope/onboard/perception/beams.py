@@ -28,6 +28,14 @@ def nearest_beam(x: float, y: float, turned: float, sensor: Sensor) -> int:
 
 
 @jit_inline
+def beam_at(n: int, sensor: Sensor) -> int:
+    """Return the beam of number ``n``, counted on round a closed circle, -1 where there is none."""
+    if sensor.wraps:
+        return n % sensor.beams
+    return n if 0 <= n < sensor.beams else -1
+
+
+@jit_inline
 def lies_between(x: float, y: float, first: int, last: int, sensor: Sensor) -> bool:
     """Tell whether the point (x, y), body frame, lies between beams ``first`` and ``last``."""
     offset = (rough_angle(x, y) - sensor.angle_min) * (1.0 / sensor.increment)

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from swarmscope._jit import jit, jit_inner
+from swarmscope.onboard.perception.lost import WITHIN
 from swarmscope.onboard.rig import Rig
 
 PATIENCE = 4
@@ -15,8 +16,6 @@ TOGETHER = 3
 """So many beams side by side may be broken and still be noticed."""
 ALIKE = 0.25
 """Two returns that differ by less than this share are of one surface."""
-WITHIN = 0.9
-"""Surfaces beyond this share of the range are not counted on."""
 
 
 @jit
@@ -31,15 +30,17 @@ def leave_out_faulty(scan: np.ndarray, misses: np.ndarray, rig: Rig) -> None:
     before = _last_before_the_first(scan, rig)
     for n in range(first, last + 1):
         if not scan[n] < sensor.range_max:
+            if misses[n] >= PATIENCE:
+                scan[n] = math.nan
             continue
         misses[n] = 0
         if 1 < n - before <= TOGETHER + 1 and _one_surface(scan[before], scan[n], n - before, rig):
-            for k in range(before + 1, n):
-                misses[k % scan.size] = min(255, misses[k % scan.size] + 1)
+            for beside in range(before + 1, n):
+                k = beside % scan.size
+                misses[k] = min(255, misses[k] + 1)
+                if misses[k] >= PATIENCE:
+                    scan[k] = math.nan
         before = n
-    for n in range(first, last + 1):
-        if misses[n] >= PATIENCE:
-            scan[n] = math.nan
 
 
 @jit_inner

@@ -8,7 +8,9 @@ from __future__ import annotations
 import math
 
 from swarmscope._jit import jit, jit_inner
-from swarmscope.onboard.perception.beams import lies_between, nearest_beam
+from swarmscope.geometry import then
+from swarmscope.onboard.perception.beams import beam_at, nearest_beam
+from swarmscope.onboard.perception.frames import in_view
 from swarmscope.onboard.rig import Rig
 from swarmscope.onboard.view import BROKEN, View
 
@@ -20,37 +22,24 @@ PLACES = 4
 
 @jit
 def find_looked_through(see: View) -> None:
-    """Mark the broken beams, 1 in ``see.safe``, through which the last scan has looked."""
-    total, wraps = see.rig.sensor.beams, see.rig.sensor.wraps
-    n = 0
-    while n < total:
-        if not see.safe[n]:
-            n += 1
-            continue
-        stop = n
-        while stop < total and see.safe[stop]:
-            stop += 1
-        width = stop - n
-        if wraps and n == 0:
-            width += _run_at_the_end(see, stop)
-        nearest = shows_beside(width, see.rig)
-        for k in range(n, stop):
-            if _looked_through(see, k, nearest):
-                see.safe[k] = LOOKED_THROUGH
-        n = stop
+    """Mark the broken beams, 1 in ``see.safe``, through which the last scan has looked; `BROKEN` are all of them."""
+    for n in range(see.rig.sensor.beams):
+        see.unseen[n] = BROKEN if see.safe[n] else 0
+    for n in range(see.rig.sensor.beams):
+        if see.safe[n] and _looked_through(see, n):
+            see.safe[n] = LOOKED_THROUGH
 
 
 @jit
 def nothing_up_to(see: View, n: int) -> float:
-    """Return up to which range nothing can stand in the hole that beam n is in [m]."""
-    total, wraps = see.rig.sensor.beams, see.rig.sensor.wraps
-    width = 1
+    """Return up to which range, the body's surface at least, nothing can stand in the hole that beam n is in [m]."""
+    sensor, radius, width = see.rig.sensor, see.rig.body.radius_m, 1
     for step in (1, -1):
-        k = n + step
-        while (wraps or 0 <= k < total) and width < total and see.unseen[k % total] & BROKEN:
+        k = beam_at(n + step, sensor)
+        while k >= 0 and see.unseen[k] & BROKEN and shows_beside(width, see.rig) > radius:
             width += 1
-            k += step
-    return shows_beside(width, see.rig)
+            k = beam_at(k + step, sensor)
+    return max(radius, shows_beside(width, see.rig))
 
 
 @jit
@@ -61,26 +50,13 @@ def shows_beside(width: int, rig: Rig) -> float:
 
 
 @jit_inner
-def _run_at_the_end(see: View, stop: int) -> int:
-    """Return how many broken beams there are before the first one, on the other side of where the circle closes."""
-    total, count = see.rig.sensor.beams, 0
-    while count < total - stop and see.safe[total - 1 - count]:
-        count += 1
-    return count
-
-
-@jit_inner
-def _looked_through(see: View, n: int, nearest: float) -> bool:
-    """Tell whether the last scan reached beyond places along beam n, from ``nearest`` [m] on."""
-    rig, percept = see.rig, see.percept
-    c, s = math.cos(percept["odom_yaw"]), math.sin(percept["odom_yaw"])
-    reach = max(nearest, rig.body.radius_m)
+def _looked_through(see: View, n: int) -> bool:
+    """Tell whether the last scan reached beyond the places along beam n from which on something may stand there."""
+    rig, percept, reach = see.rig, see.percept, nothing_up_to(see, n)
+    here = (percept["odom_x"], percept["odom_y"], percept["odom_yaw"])
     for _ in range(PLACES):
-        x, y = reach * rig.cos[n], reach * rig.sin[n]
-        x, y = percept["odom_x"] + c * x - s * y, percept["odom_y"] + s * x + c * y
-        if rig.sensor.field > 0 and not lies_between(
-            x, y, see.shared["view_first"], see.shared["view_last"], rig.sensor
-        ):
+        x, y, _yaw = then(here, (reach * rig.cos[n], reach * rig.sin[n], 0.0))
+        if rig.sensor.field > 0 and not in_view(x, y, see):
             return False
         if not see.kept[nearest_beam(x, y, 0.0, rig.sensor)] > math.sqrt(x * x + y * y):
             return False

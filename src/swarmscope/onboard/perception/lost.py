@@ -11,6 +11,7 @@ import math
 
 from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.onboard.percept import Row
+from swarmscope.onboard.perception.beams import beam_at
 from swarmscope.onboard.perception.frames import in_view
 from swarmscope.onboard.perception.holes import LOOKED_THROUGH, find_looked_through
 from swarmscope.onboard.perception.mend import least_range
@@ -115,7 +116,7 @@ def _place_of(see: View, n: int) -> tuple[float, float, int]:
 
     -1 instead of the beam when none has: it is seen, hidden or passed, may have been a neighbour, or is out of view.
     """
-    rig, percept, total = see.rig, see.percept, see.rig.sensor.beams
+    rig, percept = see.rig, see.percept
     c, s = math.cos(percept["odom_yaw"]), math.sin(percept["odom_yaw"])
     x, y = see.kept[n] * rig.cos[n] - percept["odom_x"], see.kept[n] * rig.sin[n] - percept["odom_y"]
     x, y = c * x + s * y, c * y - s * x
@@ -125,8 +126,8 @@ def _place_of(see: View, n: int) -> tuple[float, float, int]:
     first = low + 1 if between - low > 0.5 else low  # the nearer of the two goes first
     lost_by = -1
     for beam in (2 * low + 1 - first, first):
-        k = beam % total if rig.sensor.wraps else beam
-        if not 0 <= k < total:
+        k = beam_at(beam, rig.sensor)
+        if k < 0:
             return x, y, -1
         if not _sees(see, k):
             lost_by = k
@@ -144,11 +145,9 @@ def _place_of(see: View, n: int) -> tuple[float, float, int]:
 @jit_inner
 def _alone(see: View, m: int) -> bool:
     """Tell whether the beams beside beam m say nothing either: at the edge of a thing beams lose it by rights."""
-    rig, total = see.rig, see.rig.sensor.beams
-    for k in (m - 1, m + 1):
-        if rig.sensor.wraps:
-            k %= total
-        if not 0 <= k < total or _sees(see, k):
+    for beside in (m - 1, m + 1):
+        k = beam_at(beside, see.rig.sensor)
+        if k < 0 or _sees(see, k):
             return False
     return True
 
