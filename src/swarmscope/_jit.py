@@ -167,7 +167,12 @@ def jit(function: F) -> F:
 
 
 def jit_inline(function: F) -> F:
-    """Compile a tiny scalar helper so that LLVM always inlines it into its caller."""
+    """Compile ``function`` so that LLVM always inlines it into its caller.
+
+    For tiny scalar helpers, and for what is called for every robot or beam with a `View`, a `Rig`, a `Sim`: such a
+    tuple is handed over value by value, three hundred of them, which takes 0.3 us, longer than most of what is called.
+    What is rarely reached (a fault, a limited view) stays a call.
+    """
     return jit_for(function, options=LEAN | {"forceinline": True})
 
 

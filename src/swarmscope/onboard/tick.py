@@ -5,7 +5,7 @@ perceive (packets, poses, scan, safe directions) -> share (own features, answers
 
 from __future__ import annotations
 
-from swarmscope._jit import jit, jit_paste
+from swarmscope._jit import jit, jit_inline, jit_paste
 from swarmscope.onboard.control.guard import guard
 from swarmscope.onboard.perception.bearings import steady
 from swarmscope.onboard.perception.clock import keep_time
@@ -61,7 +61,7 @@ def share(see: View, wanted: bool) -> int:
     return count
 
 
-@jit
+@jit_inline
 def own_features(see: View) -> int:
     """Compute our features (7) of the masked scan into ``see.own``, compass frame; return how many.
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 
-from swarmscope._jit import jit, jit_inline
+from swarmscope._jit import jit_inline
 from swarmscope.geometry import point_segment_distance, segments_distance
 from swarmscope.sim.world import PIECE_M, World, bin_index
 
 
-@jit
+@jit_inline
 def static_clearance(world: World, ax: float, ay: float, bx: float, by: float, limit: float) -> float:
     """Return the smallest distance [m] between the path a-b of a point and any static surface.
 

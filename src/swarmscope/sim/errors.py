@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from swarmscope._jit import jit, jit_inner
+from swarmscope._jit import jit_inline, jit_inner
 from swarmscope.geometry import wrap_angle
 from swarmscope.sim.state import Sim
 from swarmscope.sim.streams import (
@@ -27,7 +27,7 @@ from swarmscope.sim.streams import (
 )
 
 
-@jit
+@jit_inline
 def compass_error(sim: Sim, tick: int, i: int) -> float:
     """Return the error of robot i's compass at this tick [rad]."""
     error = 0.0
@@ -38,7 +38,7 @@ def compass_error(sim: Sim, tick: int, i: int) -> float:
     return error
 
 
-@jit
+@jit_inline
 def measure_motion(sim: Sim, tick: int, i: int) -> None:
     """Fill speed and odometry of robot i."""
     robot, percept = sim.robots[i], sim.percepts[i]
@@ -69,7 +69,7 @@ def _spoil_odometry(sim: Sim, tick: int, i: int, root: float) -> None:
         percept["odom_yaw"] += noise.odometry_turn_rad * root * normal(key(seed, i, tick, ODOMETRY_YAW))
 
 
-@jit
+@jit_inline
 def spoil_scan(sim: Sim, tick: int, i: int) -> None:
     """Turn robot i's exact ranges into what its LiDAR says."""
     ranges, noise, seed = sim.ranges[i], sim.noise, sim.clock.seed

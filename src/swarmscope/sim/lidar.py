@@ -55,7 +55,7 @@ def make_beams(beams: int, fov_rad: float, range_max_m: float) -> Beams:
     return Beams(np.cos(angles), np.sin(angles), angle_min, increment, wraps, float(range_max_m))
 
 
-@jit
+@jit_inline
 def cast_static(world: World, x: float, y: float, yaw: float, beams: Beams, out: Ranges) -> None:
     """Fill ``out`` (M,) with the ranges [m] to the static world from pose x, y [m], yaw [rad], world frame.
 
@@ -73,7 +73,7 @@ def cast_static(world: World, x: float, y: float, yaw: float, beams: Beams, out:
         _cast_grid(world, x, y, cos_yaw, sin_yaw, beams, out)
 
 
-@jit
+@jit_inline
 def cast_disc(cx: float, cy: float, radius: float, beams: Beams, out: Ranges) -> None:
     """Lower ``out`` (M,) where the disc with centre cx, cy and ``radius`` [m], sensor frame, is nearer.
 

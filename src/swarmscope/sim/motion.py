@@ -145,7 +145,7 @@ def _meet_robots(sim: Sim) -> None:
         _gaps_of(sim, i, 0, steps, False)
 
 
-@jit
+@jit_inline
 def _gaps_of(sim: Sim, i: int, first: int, stop: int, halt: bool) -> bool:
     """Measure robot i's gaps to near robots with larger numbers within pieces first .. stop - 1 of their paths.
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmscope._jit import jit, jit_inline, jit_inner
+from swarmscope._jit import jit_inline, jit_inner
 from swarmscope.onboard.control.halves import leaves_half
 from swarmscope.onboard.control.way import Way
 from swarmscope.onboard.perception.beams import beam_at
@@ -33,13 +33,25 @@ class Corner(NamedTuple):
     """What centres keep off the corner [m]."""
 
 
-@jit
-def out_of_hidden_halves(see: View, n: int, way: Way, met: float) -> bool:
-    """Tell whether a way keeps out of the half of every robot that may be hidden past the return of beam n.
+@jit_inline
+def matters_up_to(way: Way, met: float, rig: Rig) -> float:
+    """Return from how far along a line of sight on robots do not matter for a way [m], measured from this robot.
 
     ``met`` [m]: how far one that does not yield comes until this robot stands.
     """
-    return _clear_past(see, n, 1, way, met) and _clear_past(see, n, -1, way, met)
+    most = math.sqrt(way.x5 * way.x5 + way.y5 * way.y5) + way.brake
+    return apart_round(rig) + max(2.0 * most, most + met)
+
+
+@jit_inline
+def out_of_hidden_halves(see: View, n: int, way: Way, met: float, enough: float) -> bool:
+    """Tell whether a way keeps out of the half of every robot that may be hidden past the return of beam n.
+
+    ``met`` and ``enough`` [m] as in `matters_up_to`.
+    """
+    if _nearer(see.rig) * see.scan[n] >= enough:
+        return True
+    return _clear_past(see, n, 1, way, met, enough) and _clear_past(see, n, -1, way, met, enough)
 
 
 @jit_inline
@@ -74,13 +86,15 @@ def _opens(ranges: np.ndarray, n: int, side: int, rig: Rig) -> bool:
     if not far < rig.sensor.range_max:
         return True
     near = ranges[n] * (1.0 - SIGMAS * rig.sensor.range_sigma)
+    wanted = 2.0 * (rig.body.radius_m + rig.guarding.clearance_m)
+    if far - near + near * rig.sensor.increment < wanted:
+        return False  # nearly always
     gap2 = near * near + far * far - 2.0 * near * far * math.cos(rig.sensor.increment)
-    room = rig.body.radius_m + rig.guarding.clearance_m
-    return bool(gap2 >= 4.0 * room * room)
+    return bool(gap2 >= wanted * wanted)
 
 
 @jit_inner
-def _clear_past(see: View, n: int, side: int, way: Way, met: float) -> bool:
+def _clear_past(see: View, n: int, side: int, way: Way, met: float, enough: float) -> bool:
     """Apply the rule between two robots to a body hidden past the return of beam n on a side, if it opens there.
 
     Both have to go round the corner, so lengths are those of ways round it.
@@ -89,8 +103,6 @@ def _clear_past(see: View, n: int, side: int, way: Way, met: float) -> bool:
     if not _opens(see.scan, n, side, rig):
         return True
     keeps, touch = _kept_off(rig), apart_round(rig)
-    most = math.sqrt(way.x5 * way.x5 + way.y5 * way.y5) + way.brake
-    enough = touch + max(2.0 * most, most + met)
     along = hidden_at(see.scan, n, side, enough, rig)
     if along >= enough:
         return True
@@ -103,7 +115,7 @@ def _clear_past(see: View, n: int, side: int, way: Way, met: float) -> bool:
     return leaves_half(moved, stopped, met, now - touch, rig)
 
 
-@jit
+@jit_inline
 def way_round(qx: float, qy: float, along: float, beside: float, corner: Corner) -> float:
     """Return how far it is from (qx, qy), body frame, round a corner to a place behind it [m]."""
     x = qx * corner.c + qy * corner.s - corner.x
@@ -122,7 +134,7 @@ def way_round(qx: float, qy: float, along: float, beside: float, corner: Corner)
     return math.sqrt(d * d - near * near) + math.sqrt(e * e - near * near) + near * arc
 
 
-@jit
+@jit_inline
 def hidden_at(ranges: np.ndarray, n: int, side: int, enough: float, rig: Rig) -> float:
     """Return how far along the line of sight past an edge the centre of a body is that touches it and is hidden [m].
 
@@ -131,10 +143,11 @@ def hidden_at(ranges: np.ndarray, n: int, side: int, enough: float, rig: Rig) ->
     radius, increment = rig.body.radius_m, rig.sensor.increment
     nearer = _nearer(rig)
     along: float = nearer * ranges[n]
+    c1, s1 = math.cos(increment), math.sin(increment)
+    c, s = 1.0, 0.0
     k = 1
     while along < enough and k < rig.sensor.beams:
-        psi = k * increment
-        c, s = math.cos(psi), math.sin(psi)
+        c, s = c * c1 - s * s1, s * c1 + c * s1  # of k increments
         off = along * s - radius * c
         if off >= radius:
             break

@@ -13,8 +13,10 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numpy as np
+
 from swarmscope._jit import jit, jit_inline, jit_inner
-from swarmscope.onboard.control.corners import apart_round, out_of_hidden_halves
+from swarmscope.onboard.control.corners import apart_round, matters_up_to, out_of_hidden_halves
 from swarmscope.onboard.control.halves import in_own_half, met_by
 from swarmscope.onboard.control.horizon import horizon_speed
 from swarmscope.onboard.control.unseen import look_round, out_of_sight
@@ -52,7 +54,7 @@ class Near(NamedTuple):
     """The smallest range among them [m]."""
 
 
-@jit
+@jit_inline
 def guard(see: View) -> bool:
     """Lower the speed that was decided until it is safe; return whether it had to.
 
@@ -160,11 +162,11 @@ def _near(see: View, speed: float) -> Near:
         stranger = 0.0 if guarding.others_yield else guarding.others_mps * (delay + speed / body.a_max_mps2)
         limit = max(limit, apart_round(rig) - body.radius_m + way + brake) + max(way + 3.0 * brake, stranger)
     limit /= max(0.5, 1.0 - SIGMAS * rig.sensor.range_sigma - rig.sensor.increment)
-    least = least_range(rig)
+    least, far = least_range(rig), np.float32(limit + ROUNDING_M)
     count = 0
     nearest = math.inf
     for n in range(rig.sensor.beams):
-        if not ranges[n] >= limit or see.unseen[n] & BROKEN:
+        if (not ranges[n] >= far) | (see.unseen[n] & BROKEN != 0):
             near[count] = n
             count += 1
             if least <= ranges[n] < nearest:
@@ -187,11 +189,12 @@ def _held_by(see: View, v: float, w: float, near: Near) -> int:
     met = met_by(v, percept["dt_s"], rig)
     if not alone and not _clear_of_tracks(see, way, met):
         return R_HELD_ROBOT
-    bulge = _bulge(v, w, see)
+    bulge, enough = _bulge(v, w, see), matters_up_to(way, met, rig)
     for k in range(near.beams):
-        held = _held_by_beam(see, see.edges[k], way, met, bulge)
-        if held == R_HELD_THING and rig.sensor.field > 0 and is_blurred(see, see.edges[k]):
-            see.shared["unseen_left"] = rig.sin[see.edges[k]] > 0.0
+        n = int(see.edges[k])
+        held = _held_by_beam(see, n, way, met, bulge, enough)
+        if held == R_HELD_THING and rig.sensor.field > 0 and is_blurred(see, n):
+            see.shared["unseen_left"] = rig.sin[n] > 0.0
             return R_HELD_UNSEEN
         if held != FREE:
             return held
@@ -225,7 +228,7 @@ def _kept_from(s: float, bulge: float, rig: Rig) -> tuple[float, float]:
 
 
 @jit_inner
-def _held_by_beam(see: View, n: int, way: Way, met: float, bulge: float) -> int:
+def _held_by_beam(see: View, n: int, way: Way, met: float, bulge: float, enough: float) -> int:
     """Return how the return of beam n, or who may come out from behind it, forbids a way: FREE, or the reason."""
     rig, percept, s = see.rig, see.percept, see.scan[n]
     if not s >= least_range(rig):
@@ -235,14 +238,17 @@ def _held_by_beam(see: View, n: int, way: Way, met: float, bulge: float) -> int:
         s = min(s, nothing_up_to(see, n))
     need = min(kept, s - 1e-6)  # already too close: never closer
     px, py = s * rig.cos[n], s * rig.sin[n]
-    if closer(px, py, way, need) or (way.turns and shadowed(px, py, rig.cos[n], rig.sin[n], way, need)):
+    if s - need < way.reach + ROUNDING_M and (
+        closer(px, py, way, need) or (way.turns and shadowed(px, py, rig.cos[n], rig.sin[n], way, need))
+    ):
         return R_HELD_THING
     if not rig.guarding.others_mps > 0.0:
         return FREE
-    may_be_a_robot = s > _listed_up_to(percept, rig) or near_track(percept, see.shared, px, py, rig)
-    if may_be_a_robot and not in_own_half(px, py, s, way, met, rig):
+    if not in_own_half(px, py, s, way, met, rig) and (
+        s > _listed_up_to(percept, rig) or near_track(percept, see.shared, px, py, rig)
+    ):
         return R_HELD_ROBOT
-    return FREE if out_of_hidden_halves(see, n, way, met) else R_HELD_CORNER
+    return FREE if out_of_hidden_halves(see, n, way, met, enough) else R_HELD_CORNER
 
 
 @jit_inline

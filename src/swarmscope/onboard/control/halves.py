@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from swarmscope._jit import jit, jit_inline
+from swarmscope._jit import jit_inline
 from swarmscope.onboard.control.way import Way
 from swarmscope.onboard.rig import Rig
 
@@ -15,7 +15,7 @@ def met_by(v: float, dt: float, rig: Rig) -> float:
     return rig.guarding.others_mps * (dt + rig.guarding.latency_s + v / rig.body.a_max_mps2)
 
 
-@jit
+@jit_inline
 def in_own_half(px: float, py: float, s: float, way: Way, met: float, rig: Rig) -> bool:
     """Tell whether a way keeps to its half of the gap to (px, py); its braking counts twice.
 

@@ -33,7 +33,7 @@ def safe_distance(theta: float, r_safe: float, half_sector: float) -> float:
     return r_safe * math.sin(half_sector) / math.sin(off)
 
 
-@jit
+@jit_inline
 def safe_speed(ranges: np.ndarray, rig: Rig, heading: float, dt: float, view: float = 0.5 * math.pi) -> float:
     """Return the largest speed [m/s] towards ``heading`` [rad, body frame] by (2).
 

@@ -30,25 +30,32 @@ class Way(NamedTuple):
     brake: float
     turns: bool
     """Whether it is not straight."""
+    reach: float
+    """Nothing of it is farther from where the robot is now."""
 
 
-@jit
+@jit_inline
 def way_of(speed: float, v: float, w: float, see: View) -> Way:
     """Return the way of commanding (v, w) at ``speed``."""
     a_max = see.rig.body.a_max_mps2
     step = see.percept["dt_s"] / STEPS
     x0 = speed * see.rig.guarding.latency_s
+    driven = abs(x0)
     speed, way = ramp(speed, v, a_max, step)
+    driven += abs(way)
     x1, y1 = x0 + way * math.cos(0.5 * w * step), way * math.sin(0.5 * w * step)
     speed, way = ramp(speed, v, a_max, step)
+    driven += abs(way)
     x2, y2 = x1 + way * math.cos(1.5 * w * step), y1 + way * math.sin(1.5 * w * step)
     speed, way = ramp(speed, v, a_max, step)
+    driven += abs(way)
     x3, y3 = x2 + way * math.cos(2.5 * w * step), y2 + way * math.sin(2.5 * w * step)
     speed, way = ramp(speed, v, a_max, step)
+    driven += abs(way)
     x4, y4 = x3 + way * math.cos(3.5 * w * step), y3 + way * math.sin(3.5 * w * step)
     brake = speed * speed / (2.0 * a_max)
     x5, y5 = x4 + brake * math.cos(4.0 * w * step), y4 + brake * math.sin(4.0 * w * step)
-    return Way(x1, y1, x2, y2, x3, y3, x4, y4, x5, y5, brake, w != 0.0)
+    return Way(x1, y1, x2, y2, x3, y3, x4, y4, x5, y5, brake, w != 0.0, driven + brake)
 
 
 @jit_inline

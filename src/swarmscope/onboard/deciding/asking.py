@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from swarmscope._jit import jit, jit_paste
+from swarmscope._jit import jit_inline, jit_paste
 from swarmscope.geometry import wrap_angle
 from swarmscope.onboard.percept import MAX_NEIGHBOURS
 from swarmscope.onboard.perception.safety import beam_of
@@ -23,7 +23,7 @@ def request_ahead(see: View, ahead_s: float, every_s: float) -> None:
         ask_neighbours(see)
 
 
-@jit
+@jit_inline
 def obstacle_ahead(see: View, horizon: float) -> bool:
     """Tell whether on the way to a goal beyond ``horizon`` [m] something stands nearer than that."""
     if see.percept["goal_distance"] <= horizon:
@@ -39,7 +39,7 @@ def obstacle_ahead(see: View, horizon: float) -> bool:
     return False
 
 
-@jit
+@jit_inline
 def ask_neighbours(see: View) -> None:
     """Start a round of requests to every neighbour seen now in the pass band (sigma_a, 3 sigma_a]."""
     start_round(see)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmscope._jit import jit, jit_inner
+from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.geometry import wrap_angle
 from swarmscope.onboard.control.wanting import halt
 from swarmscope.onboard.deciding.asking import ask_neighbours
@@ -42,7 +42,7 @@ class Manner(NamedTuple):
     """Read features as SFM-MAS does: areas (24), passable distances (22) with borders on the chords."""
 
 
-@jit
+@jit_inline
 def decide_side(see: View, memory: Row, count: int, manner: Manner) -> bool:
     """State ii: choose the side, asking, and waiting for answers that are still out. Return whether it is chosen.
 
@@ -85,7 +85,7 @@ def own_probability(features: Table, count: int, half_alpha: float, bias: float,
     )
 
 
-@jit
+@jit_inline
 def choose_side(see: View, count: int, w_i: float, bias: float, polygon: bool) -> int:
     """Return the side to pass the obstacle on, +1 left or -1 right, and note the numbers in ``see.out``.
 

@@ -52,7 +52,7 @@ def resume(see: View, memory: Row, resume_m: float) -> bool:
     return True
 
 
-@jit
+@jit_inline
 def reconsider(see: View, memory: Row, loop_m: float, reopen: float) -> None:
     """Change sides when another obstacle stands in the way now: the way past it on the other side turns off less.
 
@@ -91,7 +91,7 @@ class Way(NamedTuple):
     found: bool
 
 
-@jit
+@jit_inline
 def follow(see: View, memory: Row, wide_turn: float, turn_back: float, speed: float) -> None:
     """State iii: the first safe direction on the chosen side, counted from the target (16), or from the border."""
     side = int(memory["side"])
@@ -188,7 +188,7 @@ def turn_to_safe(see: View, safe: np.ndarray, side: int) -> float:
     return angle_from(0.0, side * (heading - start))
 
 
-@jit
+@jit_inline
 def away_from_nearest(see: View) -> float:
     """Return the direction opposite to the nearest valid return (body frame): the one that gains clearance."""
     sensor = see.rig.sensor

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from swarmscope._jit import jit, jit_paste
+from swarmscope._jit import jit, jit_inline, jit_paste
 from swarmscope.geometry import TWO_PI
 from swarmscope.onboard.control.unicycle import arrival_speed
 from swarmscope.onboard.control.wanting import halt
@@ -48,7 +48,7 @@ def is_final(see: View) -> bool:
     return bool(see.percept["goal_distance"] <= max(see.margins.l_th + rig.footprint, rig.look_ahead))
 
 
-@jit
+@jit_inline
 def goal_is_free(see: View, final: bool) -> bool:
     """Tell whether the goal's direction is safe; in the ``final`` approach: whether the body fits through to it."""
     bearing, goal = see.percept["goal_bearing"], see.percept["goal_distance"]
@@ -58,7 +58,7 @@ def goal_is_free(see: View, final: bool) -> bool:
     return bool(beam >= 0 and see.safe[beam] == 1)
 
 
-@jit
+@jit_inline
 def watch_progress(see: View, memory: Row, stuck_s: float) -> None:
     """Count the way made. Notice a following that gets no closer to the goal for long.
 
@@ -78,7 +78,7 @@ def watch_progress(see: View, memory: Row, stuck_s: float) -> None:
     memory["strict"] = 1
 
 
-@jit
+@jit_inline
 def may_leave(see: View, memory: Row) -> bool:
     """Tell whether a following may end: a strict one when the way is seen free until closer to the goal than ever."""
     if memory["strict"] == 0:
@@ -87,7 +87,7 @@ def may_leave(see: View, memory: Row) -> bool:
     return bool(in_sight <= 0.0 or in_sight < memory["closest"] - LEAVE_GAIN)
 
 
-@jit
+@jit_inline
 def nearest_in_sight(see: View) -> float:
     """Return the goal distance [m] up to which the straight way to the goal is seen to be free."""
     goal = see.percept["goal_distance"]

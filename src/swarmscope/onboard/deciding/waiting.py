@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from swarmscope._jit import jit, jit_inner
+from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.onboard.deciding.fields import P_FREE, interaction_force, yields_to
 from swarmscope.onboard.percept import PEERS, Row
 from swarmscope.onboard.reasons import R_YIELD, YIELD
@@ -22,7 +22,7 @@ AHEAD_S = 2.0
 """A collision is possible when two robots come that close within this time, both driving straight on."""
 
 
-@jit
+@jit_inline
 def wait(see: View, memory: Row, must: bool, longest_s: float) -> None:
     """Stand still while ``must`` holds, at most ``longest_s``; then do not wait again for the same time."""
     now = see.percept["now_s"]
@@ -60,7 +60,7 @@ def _meeting(see: View, t: int, still_s: float, w_i: float) -> Meeting:
     return Meeting(True, math.atan2(y, x), interaction_force(distance, sigma_a, max(w_i, 1.0)))
 
 
-@jit
+@jit_inline
 def repelled(see: View, still_s: float, w_i: float) -> bool:
     """Tell whether (17) holds for a moving neighbour that goes before us.
 
@@ -77,7 +77,7 @@ def repelled(see: View, still_s: float, w_i: float) -> bool:
     return False
 
 
-@jit
+@jit_inline
 def behind(see: View, still_s: float, w_i: float) -> bool:
     """Tell whether (27) holds for a moving neighbour that has the higher priority (SFM-MAS IV-D)."""
     travel = see.percept["compass"] + see.out["heading"]

@@ -30,9 +30,9 @@ def nearest_beam(x: float, y: float, turned: float, sensor: Sensor) -> int:
 @jit_inline
 def beam_at(n: int, sensor: Sensor) -> int:
     """Return the beam of number ``n``, counted on round a closed circle, -1 where there is none."""
-    if sensor.wraps:
-        return n % sensor.beams
-    return n if 0 <= n < sensor.beams else -1
+    if 0 <= n < sensor.beams:
+        return n
+    return n % sensor.beams if sensor.wraps else -1
 
 
 @jit_inline

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from swarmscope._jit import jit, jit_inner
+from swarmscope._jit import jit_inline, jit_inner
 from swarmscope.geometry import wrap_angle
 from swarmscope.onboard.percept import Row
 
@@ -16,7 +16,7 @@ JUMP_RAD, JUMP_M = 0.8, 1.0
 """What is off by more than this is new: another goal, a compass that was set anew."""
 
 
-@jit
+@jit_inline
 def steady(percept: Row, shared: Row) -> None:
     """Replace compass, goal bearing and goal distance of the percept by what they and odometry say together.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from swarmscope._jit import jit, jit_inline
+from swarmscope._jit import jit_inline
 from swarmscope.onboard.percept import Row
 
 JUMP_PERIODS = 5.0
@@ -13,7 +13,7 @@ EVEN_S = 1e-6
 """A tick that comes this close to when it should is on time [s]; a clock that shows 1.7e9 s rounds less than that."""
 
 
-@jit
+@jit_inline
 def keep_time(percept: Row, shared: Row) -> None:
     """Make ``percept["now_s"]`` the time since the robot's first tick: all that is waited for counts time that passed.
 

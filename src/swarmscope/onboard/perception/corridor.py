@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 
-from swarmscope._jit import jit
+from swarmscope._jit import jit_inline
 from swarmscope.onboard.rig import Rig
 
 
-@jit
+@jit_inline
 def corridor_length(ranges: np.ndarray, rig: Rig, bearing: float, half_width: float, limit: float) -> float:
     """Return how far [m] a disc of radius ``half_width`` gets along ``bearing`` before it touches a return.
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from swarmscope._jit import jit, jit_inner
+from swarmscope._jit import jit_inline, jit_inner
 from swarmscope.onboard.perception.lost import WITHIN
 from swarmscope.onboard.rig import Rig
 
@@ -18,7 +18,7 @@ ALIKE = 0.25
 """Two returns that differ by less than this share are of one surface."""
 
 
-@jit
+@jit_inline
 def leave_out_faulty(scan: np.ndarray, misses: np.ndarray, rig: Rig) -> None:
     """Write NaN over what faulty beams of ``scan (M,)`` [m] say; keep up how often each of them has missed something.
 

@@ -37,12 +37,13 @@ def extrema(
     slope_step = 0
     count = 0
     n = start
+    ahead = filtered[start]
     for k in range(steps + (1 if sensor.wraps else 0)):
         after = n + 1 if n + 1 < beams else 0
-        change = filtered[after] - filtered[n]
-        if change > flat or change < -flat:
-            sign = 1 if change > flat else -1
-            if rising not in (0, sign):
+        here, ahead = ahead, filtered[after]
+        if abs(ahead - here) > flat:
+            sign = 1 if ahead > here else -1
+            if sign == -rising:
                 beam = slope_at + 1 + (k - slope_step - 1) // 2
                 if beam >= beams:
                     beam -= beams

@@ -46,13 +46,12 @@ def prepare_scan(
     ``range_min`` are invalid and count as range 0. Filtering the deviation keeps open space exactly flat.
     """
     beams = ranges.size
+    least, most, nothing = np.float32(range_min), np.float32(range_max), np.float32(0.0)
+    middle = padded[half : half + beams]
     for n in range(beams):
         s = ranges[n]
-        if not s >= range_min:
-            s = np.float32(0.0)
-        elif s > range_max:
-            s = np.float32(range_max)
-        padded[half + n] = np.float32(range_max) - s
+        s = most if s > most else s
+        middle[n] = most - (s if s >= least else nothing)
     for k in range(half):
         if wraps:
             padded[k] = padded[beams + k]

@@ -9,7 +9,10 @@ from __future__ import annotations
 
 import math
 
-from swarmscope._jit import jit, jit_inline, jit_inner
+import numpy as np
+
+from swarmscope._jit import jit_inline, jit_inner
+from swarmscope.geometry import Pose, rough_angle
 from swarmscope.onboard.percept import Row
 from swarmscope.onboard.perception.beams import beam_at
 from swarmscope.onboard.perception.frames import in_view
@@ -26,16 +29,21 @@ THROUGH = 0.1
 """A beam that is off a place by less than this part of the way to the next has looked there."""
 MEMORY = 0.9
 """What stays of the share of lost returns from tick to tick."""
+PASSED = 0.3
+"""What was passed by so many times its distance is looked for in earnest, ..."""
+ROUGHLY = PASSED**5 / 5.0
+"""... for the rest two terms of the arc tangent do, which err by less than this [rad]."""
+DROPPED = np.float32(-1e9)
 SLIPS = 2
 MOST_TICKS = BROKEN - 1
 
 
-@jit
+@jit_inline
 def keep_lost(see: View, broken: int) -> None:
     """Write what was lost since the last scan back into ``see.scan``; keep that scan in ``see.kept``.
 
     So many beams are ``broken``, 1 in ``see.safe``: where they look, what was seen there stays, however they are
-    bridged. ``see.edges``, ``see.filtered`` and ``see.narrow`` are scratch.
+    bridged. ``see.edges``, ``see.filtered``, ``see.narrow`` and ``see.padded`` are scratch.
     """
     rig, percept = see.rig, see.percept
     seen = 0
@@ -49,36 +57,50 @@ def keep_lost(see: View, broken: int) -> None:
     if broken > 0:
         find_looked_through(see)
     for n in range(rig.sensor.beams):
-        see.unseen[n] = BROKEN if see.safe[n] == 1 else 0
+        see.unseen[n] = 0
         see.kept[n] = see.scan[n]
+    if broken > 0:
+        _keep_broken(see)
+    if found:
+        _write_back(see)
+
+
+@jit_inner
+def _keep_broken(see: View) -> None:
+    """Note which beams are broken, in the kept scan as well."""
+    for n in range(see.rig.sensor.beams):
+        see.unseen[n] = BROKEN if see.safe[n] == 1 else 0
         if see.safe[n]:
             see.kept[n] = math.inf if see.safe[n] == LOOKED_THROUGH else 0.0
-        if found and see.filtered[n] < see.scan[n]:
+
+
+@jit_inner
+def _write_back(see: View) -> None:
+    """Write what was lost into the scan and into the kept one."""
+    for n in range(see.rig.sensor.beams):
+        if see.filtered[n] < see.scan[n]:
             see.scan[n] = see.kept[n] = see.filtered[n]
-            see.unseen[n] += see.narrow[n]
+            see.unseen[n] += see.edges[n]
 
 
 @jit_inner
 def _find_lost(see: View, most: int) -> tuple[int, bool]:
-    """Write ranges of lost returns into ``see.filtered``, for how many ticks into ``see.narrow``.
+    """Write ranges of lost returns into ``see.filtered``, for how many ticks into ``see.edges``.
 
     Return how many were lost where the scan says nothing, and whether any were, where it is broken included.
     """
-    rig = see.rig
-    total, least, far = rig.sensor.beams, least_range(rig), WITHIN * rig.sensor.range_max
-    turned = int(math.floor(see.percept["odom_yaw"] / rig.sensor.increment + 0.5))
-    moved = math.sqrt(see.percept["odom_x"] ** 2 + see.percept["odom_y"] ** 2)
-    _count_silent(see)
+    total = see.rig.sensor.beams
+    here = see.percept["odom_x"], see.percept["odom_y"], see.percept["odom_yaw"]
+    c, s = math.cos(here[2]), math.sin(here[2])
+    _mark_silent(see)
+    _find_beams(see, here, most)
     lost, found = 0, False
     for n in range(total):
-        if not least <= see.kept[n] < far or (see.unseen[n] & MOST_TICKS) >= most:
+        if _is_seen(see, n):
             continue
-        m = (n - turned) % total
-        aside = 2 + int(1.6 * moved / (see.kept[n] * rig.sensor.increment))  # 1.6 > asin(x) / x
-        low, high = m - aside, m + aside
-        if low >= 0 and high < total and see.edges[high + 1] == see.edges[low]:
-            continue
-        x, y, m = _place_of(see, n)
+        x, y = see.kept[n] * see.rig.cos[n] - here[0], see.kept[n] * see.rig.sin[n] - here[1]
+        x, y = c * x + s * y, c * y - s * x
+        m = _lost_by(see, x, y)
         if m < 0:
             continue
         if not found:
@@ -90,18 +112,51 @@ def _find_lost(see: View, most: int) -> tuple[int, bool]:
         distance = math.sqrt(x * x + y * y)
         if distance < see.filtered[m]:
             see.filtered[m] = distance
-            see.narrow[m] = (see.unseen[n] & MOST_TICKS) + 1 + (GUARD_ALONE if by_rights else 0)
+            see.edges[m] = (see.unseen[n] & MOST_TICKS) + 1 + (GUARD_ALONE if by_rights else 0)
     return lost, found
 
 
 @jit_inner
-def _count_silent(see: View) -> None:
-    """Write into ``see.edges`` how many beams before each have no sound return."""
-    count = 0
-    for n in range(see.rig.sensor.beams):
-        see.edges[n] = count
-        count += not _sees(see, n)
-    see.edges[see.rig.sensor.beams] = count
+def _mark_silent(see: View) -> None:
+    """Write into ``see.narrow`` whether one of beam n and the next has no sound return."""
+    total, far = see.rig.sensor.beams, np.float32(see.rig.sensor.range_max)
+    for n in range(total):
+        see.narrow[n] = (not see.scan[n] < far) | (see.safe[n] != 0)
+    for n in range(total - 1):
+        see.narrow[n] |= see.narrow[n + 1]
+
+
+@jit_inner
+def _find_beams(see: View, here: Pose, most: int) -> None:
+    """Write into ``see.padded`` by how many beams the returns of the last scan are displaced now, within `ROUGHLY`.
+
+    `DROPPED` where nothing was near enough, or it has been kept for ``most`` ticks; NaN where it has moved on so far
+    that this is not good enough. Without branches, so that it is done for several beams at a time.
+    """
+    rig, (x0, y0, yaw) = see.rig, here
+    least, far = np.float32(least_range(rig)), np.float32(WITHIN * rig.sensor.range_max)
+    turned, per_increment = yaw / rig.sensor.increment, 1.0 / rig.sensor.increment
+    for n in range(rig.sensor.beams):
+        s = see.kept[n]
+        ahead = s - x0 * rig.cos[n] - y0 * rig.sin[n]
+        passed = (x0 * rig.sin[n] - y0 * rig.cos[n]) / ahead
+        near = (ahead > 0.0) & (abs(passed) < PASSED)
+        dropped = (not s >= least) | (not s < far) | ((see.unseen[n] & MOST_TICKS) >= most)
+        displaced = (passed - passed**3 / 3.0) * per_increment - turned if near else math.nan
+        see.padded[n] = DROPPED if dropped else displaced
+
+
+@jit_inline
+def _is_seen(see: View, n: int) -> bool:
+    """Tell whether the beams that look past the place of beam n of the last scan surely have sound returns."""
+    displaced = see.padded[n]
+    if displaced == DROPPED:
+        return True
+    slack = ROUGHLY / see.rig.sensor.increment + 1e-6 * see.rig.sensor.beams
+    between = n + displaced
+    if not (between >= slack and between < see.rig.sensor.beams - 2):
+        return False
+    return bool(see.narrow[int(between - slack)] == 0 and see.narrow[int(between + slack)] == 0)
 
 
 @jit_inline
@@ -111,35 +166,32 @@ def _sees(see: View, k: int) -> bool:
 
 
 @jit_inner
-def _place_of(see: View, n: int) -> tuple[float, float, int]:
-    """Return where the return of beam n of the last scan is now, body frame [m], and the beam that has lost it.
+def _lost_by(see: View, x: float, y: float) -> int:
+    """Return the beam that has lost what the last scan saw at (x, y), body frame [m].
 
-    -1 instead of the beam when none has: it is seen, hidden or passed, may have been a neighbour, or is out of view.
+    -1 when none has: it is seen, hidden or passed, may have been a neighbour, or is out of view.
     """
     rig, percept = see.rig, see.percept
-    c, s = math.cos(percept["odom_yaw"]), math.sin(percept["odom_yaw"])
-    x, y = see.kept[n] * rig.cos[n] - percept["odom_x"], see.kept[n] * rig.sin[n] - percept["odom_y"]
-    x, y = c * x + s * y, c * y - s * x
     distance = math.sqrt(x * x + y * y)
-    between = (math.atan2(y, x) - rig.sensor.angle_min) / rig.sensor.increment
+    between = (rough_angle(x, y) - rig.sensor.angle_min) / rig.sensor.increment
     low = int(math.floor(between))
     first = low + 1 if between - low > 0.5 else low  # the nearer of the two goes first
     lost_by = -1
     for beam in (2 * low + 1 - first, first):
         k = beam_at(beam, rig.sensor)
         if k < 0:
-            return x, y, -1
+            return -1
         if not _sees(see, k):
             lost_by = k
         elif see.scan[k] < distance + SAME_M or abs(between - beam) < THROUGH:
-            return x, y, -1
+            return -1
     if lost_by < 0 or not least_range(rig) <= distance < WITHIN * rig.sensor.range_max:
-        return x, y, -1
+        return -1
     if rig.sensor.field > 0 and not in_view(x, y, see):
-        return x, y, -1
+        return -1
     if was_near_track(percept, see.shared, x, y, rig):
-        return x, y, -1
-    return x, y, lost_by
+        return -1
+    return lost_by
 
 
 @jit_inner

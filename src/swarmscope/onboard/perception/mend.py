@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from swarmscope._jit import jit, jit_inline, jit_inner
+from swarmscope._jit import jit_inline, jit_inner
 from swarmscope.onboard.rig import Rig
 
 NEAR_BODIES = 4.0
@@ -27,7 +27,7 @@ def body_and_clearance(rig: Rig) -> float:
     return rig.body.radius_m + rig.guarding.clearance_m + BESIDE
 
 
-@jit
+@jit_inline
 def mend(ranges: np.ndarray, rig: Rig, broken: np.ndarray) -> int:
     """Replace broken readings (NaN, below ``least_range``) of ``ranges (M,)`` [m] in place; return how many there were.
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmscope._jit import jit, jit_inner
+from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.geometry import ray_segment, wrap_angle
 from swarmscope.onboard.lidar import Rays
 from swarmscope.onboard.view import View
@@ -57,13 +57,20 @@ class End(NamedTuple):
     bearing: float
 
 
-@jit
+@jit_inline
 def move_on(see: View) -> None:
     """Make ``see.scan`` of a moment before what is seen from where the robot is now; ``see.filtered`` is scratch."""
+    percept = see.percept
+    far = math.hypot(percept["scan_x"], percept["scan_y"]) > NEAR_M
+    if far or abs(percept["scan_yaw"]) > NEAR_STEPS * see.rig.sensor.increment:
+        _see_from_here(see)
+
+
+@jit
+def _see_from_here(see: View) -> None:
+    """Make ``see.scan`` what is seen from where the robot is now."""
     percept, sensor = see.percept, see.rig.sensor
     x, y, yaw = percept["scan_x"], percept["scan_y"], percept["scan_yaw"]
-    if math.hypot(x, y) <= NEAR_M and abs(yaw) <= NEAR_STEPS * sensor.increment:
-        return
     for n in range(sensor.beams):  # out of a limited view nothing was measured
         measured = sensor.field == 0 or sensor.first <= n < sensor.first + sensor.field
         see.filtered[n] = see.scan[n] if measured else math.inf

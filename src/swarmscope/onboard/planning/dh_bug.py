@@ -32,7 +32,7 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from swarmscope._jit import jit
+from swarmscope._jit import jit_inline
 from swarmscope.bounds import Bounds, Degrees, Flag, Metres, Seconds, Seed, Speed
 from swarmscope.onboard.deciding import bug
 from swarmscope.onboard.deciding.bug import KEY_POINT, MEMORY, driving_of, new_memory, toss
@@ -81,7 +81,7 @@ class Params(NamedTuple):
     """Longest wait; after it nobody is waited for during the same time."""
 
 
-@jit
+@jit_inline
 def decide(see: View, memory: Row, params: Params) -> None:
     """Drive on, or choose a side and follow; wait for who goes first."""
     rule = NARROW if params.long_gaps else FITS
@@ -96,7 +96,7 @@ def decide(see: View, memory: Row, params: Params) -> None:
     bug.avoid(see, memory, driving)
 
 
-@jit
+@jit_inline
 def choose_turn(see: View, memory: Row, params: Params) -> int:
     """Return the side to turn to at a key point, +1 left, -1 right. A planner with an optimiser has its own."""
     side = 0

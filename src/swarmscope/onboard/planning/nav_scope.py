@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from swarmscope._jit import jit, jit_inline
+from swarmscope._jit import jit_inline
 from swarmscope.bounds import Flag, Metres, Radians, Seconds, Weight
 from swarmscope.onboard.deciding.asking import request_ahead
 from swarmscope.onboard.deciding.choosing import Manner, decide_side
@@ -82,7 +82,7 @@ class Params(NamedTuple):
     """A second choice of side this close to an earlier one, without progress, is a loop."""
 
 
-@jit
+@jit_inline
 def decide(see: View, memory: Row, params: Params) -> None:
     """Choose state, heading and speed; ask, and answer who asks."""
     count = share(see, wants_features(see, memory))
@@ -114,7 +114,7 @@ def _manner(params: Params) -> Manner:
     )
 
 
-@jit
+@jit_inline
 def wants_features(see: View, memory: Row) -> bool:
     """Tell whether our own features are needed in this tick because a side may have to be chosen."""
     if memory["mode"] == ARRIVED or memory["mode"] == FOLLOW:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from swarmscope._jit import jit, jit_inline
+from swarmscope._jit import jit_inline
 from swarmscope.bounds import Flag, Metres, Radians, Seconds, Weight
 from swarmscope.onboard.deciding.choosing import Manner, decide_side
 from swarmscope.onboard.deciding.fields import P_FREE, obstacle_constant, obstacle_force, propulsion, yields_to
@@ -75,7 +75,7 @@ class Params(NamedTuple):
     """A second choice of side this close to an earlier one, without progress, is a loop."""
 
 
-@jit
+@jit_inline
 def decide(see: View, memory: Row, params: Params) -> None:
     """Choose state, heading and speed; ask, and answer who asks."""
     free = way_is_free(see)
@@ -103,14 +103,14 @@ def _manner(params: Params) -> Manner:
     return Manner(params.w_i, params.prior, 0.0, params.patience_s, params.resume_m, params.loop_m, True)
 
 
-@jit
+@jit_inline
 def way_is_free(see: View) -> bool:
     """Tell whether no obstacle stops the way to the goal (26) and its direction is safe."""
     final = is_final(see)
     return bool(goal_is_free(see, final) and (final or not obstacle_stops(see)))
 
 
-@jit
+@jit_inline
 def obstacle_stops(see: View) -> bool:
     """Tell whether (18) holds towards the goal: one return's repulsion outweighs the propulsion.
 

@@ -28,6 +28,8 @@ def _crc_table() -> np.ndarray:
 
 
 _CRC_TABLE = _crc_table()
+_CRC_TABLE_2 = ((_CRC_TABLE & 0xFF) << 8) ^ _CRC_TABLE[_CRC_TABLE >> 8]
+"""The checksum of each byte and a zero after it: two bytes are taken at a time, which halves the waiting."""
 
 
 @jit
@@ -37,8 +39,11 @@ def crc16(data: np.ndarray, length: int, init: int = CRC_INIT) -> int:
     With ``init=0xFFFF`` it is CRC-16/CCITT-FALSE.
     """
     crc = int(init) & 0xFFFF
-    for i in range(min(length, data.size)):
-        crc = ((crc & 0xFF) << 8) ^ _CRC_TABLE[(crc >> 8) ^ int(data[i])]
+    n = max(0, min(length, data.size))
+    for i in range(0, n - 1, 2):
+        crc = _CRC_TABLE_2[(crc >> 8) ^ int(data[i])] ^ _CRC_TABLE[(crc & 0xFF) ^ int(data[i + 1])]
+    if n & 1:
+        crc = ((crc & 0xFF) << 8) ^ _CRC_TABLE[(crc >> 8) ^ int(data[n - 1])]
     return crc
 
 

@@ -34,7 +34,7 @@ OWN_ROOM = 4
 """So many requests of our own have room in the outbox of a tick, whatever else is in it."""
 
 
-@jit
+@jit_inline
 def read_inbox(see: View) -> None:
     """Take in this tick's packets: remember features heard, who asks for ours, and which packets are LATENT answers.
 
@@ -232,7 +232,7 @@ def answer_directed(see: View, q: int, codes: np.ndarray, scale_code: int) -> No
     see.out["n_out"] = k + 1
 
 
-@jit
+@jit_inline
 def answer_all(see: View, count: int) -> None:
     """Answer everybody who asked with our ``count`` features ``see.own``."""
     own = see.own

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from swarmscope._jit import jit, jit_inner
+from swarmscope._jit import jit_inline, jit_inner
 from swarmscope.onboard.percept import NEVER_S, PEERS, SENDERS, Row
 from swarmscope.onboard.sharing.window import CLOSED, OPEN, WINDOW, Seen, ahead_by, is_near, is_seen, with_seen
 from swarmscope.onboard.view import View
@@ -33,7 +33,7 @@ STRANGERS_PER_S = 16
 """Requests of all together that are not in sight: addresses can be made up, and an answer is longer than a request."""
 
 
-@jit
+@jit_inline
 def take_request(see: View, header: np.ndarray) -> int:
     """Return the slot of the sender of a request (``header`` as ``decode`` fills it in), -1 if it is no new one."""
     shared, now = see.shared, see.percept["now_s"]
@@ -65,7 +65,7 @@ def take_request(see: View, header: np.ndarray) -> int:
     return -1
 
 
-@jit
+@jit_inline
 def note_answer(see: View, header: np.ndarray) -> None:
     """Take the numbers of an answer to our present request for those that its sender has now, whatever came before."""
     shared = see.shared
@@ -81,7 +81,7 @@ def note_answer(see: View, header: np.ndarray) -> None:
     _note(see, p, header, SURE)
 
 
-@jit
+@jit_inline
 def may_answer(see: View, p: int) -> bool:
     """Tell whether the sender in slot ``p`` gets one more answer in this second, and count it."""
     shared, now = see.shared, see.percept["now_s"]

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from swarmscope._jit import jit, jit_inline, jit_inner
+from swarmscope.geometry import rough_angle
 from swarmscope.onboard.percept import PEERS, Row
 from swarmscope.onboard.rig import SIGMAS, Rig
 from swarmscope.onboard.view import GUARD_ALONE, View
@@ -19,7 +20,7 @@ STILL_RADIUS = 0.08
 """A neighbour that stays within this of one place stands still [m]."""
 
 
-@jit
+@jit_inline
 def update_odometry(percept: Row, shared: Row) -> tuple[float, float]:
     """Add this tick's odometry to the robot's own displacement; return it (compass frame) [m]."""
     if shared["started"] == 0:
@@ -35,7 +36,7 @@ def update_odometry(percept: Row, shared: Row) -> tuple[float, float]:
     return dx, dy
 
 
-@jit
+@jit_inline
 def update_tracks(percept: Row, shared: Row, rig: Rig, dx: float, dy: float) -> None:
     """Move every track on by dead reckoning, then correct it with what is observed now.
 
@@ -146,7 +147,7 @@ def _place(shared: Row, x: float, y: float) -> int:
     return worst
 
 
-@jit
+@jit_inline
 def mask_moving_neighbours(see: View, still_s: float) -> None:
     """Copy the scan into ``see.masked`` without the returns of neighbours that move (no return instead), nor those that
     are kept for the guard alone.
@@ -167,7 +168,7 @@ def moves(percept: Row, shared: Row, t: int, still_s: float) -> bool:
     return bool(shared["track_id"][t] >= 0 and percept["now_s"] - shared["track_moved_s"][t] < still_s)
 
 
-@jit
+@jit_inline
 def returns_of(see: View, t: int, hide: bool) -> float:
     """Return the smallest range [m] among the returns that may belong to the neighbour of track ``t``, inf for none.
 
@@ -183,9 +184,10 @@ def returns_of(see: View, t: int, hide: bool) -> float:
     nearest = math.inf
     if d - reach > sensor.range_max:
         return nearest
-    half_angle = math.asin(reach / d) if d > reach else math.pi
-    spread = int(math.ceil(half_angle / sensor.increment))
-    centre = int(math.floor((math.atan2(y, x) - sensor.angle_min) / sensor.increment + 0.5))
+    share = reach / d if d > reach else 1.0
+    half_angle = share + (0.5 * math.pi - 1.0) * share**3 if d > reach else math.pi  # asin, or a little more
+    spread = int(math.ceil(half_angle / sensor.increment)) + 1
+    centre = int(math.floor((rough_angle(x, y) - sensor.angle_min) / sensor.increment + 0.5))
     if 2 * spread + 1 > sensor.beams:
         spread = (sensor.beams - 1) // 2
     for k in range(centre - spread, centre + spread + 1):
@@ -211,7 +213,7 @@ def neighbour_reach(distance: float, rig: Rig) -> float:
     return rig.body.radius_m + 0.06 + 2.0 * noise * distance
 
 
-@jit
+@jit_inline
 def near_track(percept: Row, shared: Row, px: float, py: float, rig: Rig) -> bool:
     """Tell whether the return at (px, py), body frame, may belong to a neighbour: to where it is seen, or its track."""
     for k in range(percept["n_neighbours"]):
@@ -228,7 +230,7 @@ def on_track(percept: Row, shared: Row, px: float, py: float, rig: Rig) -> bool:
     return _near_track(percept, shared, px, py, rig, -1.0)
 
 
-@jit
+@jit_inline
 def was_near_track(percept: Row, shared: Row, px: float, py: float, rig: Rig) -> bool:
     """Tell whether what was at (px, py), body frame of now, a tick ago may have belonged to a neighbour."""
     way = max(rig.guarding.others_mps, rig.body.v_max_mps) * percept["dt_s"]

@@ -1,0 +1,56 @@
+"""Compile what nearly all tests need, in halves that two processes can do beside each other.
+
+    python tests/warm.py planners    # a step of every planner
+    python tests/warm.py world       # a tick of the world
+
+Without this every process of the tests that run first would compile the same kernels.
+"""
+
+from __future__ import annotations
+
+import sys
+
+from swarmscope.errors import MissingExtraError
+from swarmscope.onboard.planners import load_planner, planner_names
+from swarmscope.onboard.view import new_swarm
+from swarmscope.scenarios.places import make_setup
+from swarmscope.scenarios.read import parse_scenario
+from swarmscope.scenarios.to_kernels import make_rig_of, make_setting
+from swarmscope.sim.cells import index_robots
+from swarmscope.sim.loop import world_phase
+from swarmscope.sim.sensing import sense
+from swarmscope.sim.state import Clock, Conditions, Start, new_records, new_sim
+
+SCENARIO = {"task": {"name": "T1"}, "robots": 2}
+
+
+def planners() -> None:
+    """Let every planner take a step."""
+    rig = make_rig_of(parse_scenario(SCENARIO, "warm"))
+    for name in planner_names():
+        try:
+            planner = load_planner(name)
+            planner.step_all(0, 1, new_swarm(1, rig), planner.new_memory(1), planner.params())
+        except MissingExtraError as error:
+            print(error)
+
+
+def world() -> None:
+    """Let the world go on by a tick."""
+    scenario = parse_scenario(SCENARIO, "warm")
+    setting = make_setting(scenario, make_setup(scenario))
+    sim, swarm = new_sim(
+        setting.world,
+        setting.beams,
+        setting.rig,
+        Start(setting.starts, setting.goals, setting.bounds),
+        Conditions(setting.noise, setting.radio, setting.faults),
+        Clock(int(setting.seed), float(setting.dt), int(setting.substeps)),
+    )
+    index_robots(sim)
+    sense(sim, 0, 0, len(setting.starts))
+    world_phase(sim, swarm.safe, new_records(1, len(setting.starts), 0), 0, False, 0)
+
+
+if __name__ == "__main__":
+    {"planners": planners, "world": world}[sys.argv[1]]()
