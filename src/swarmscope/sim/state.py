@@ -315,7 +315,7 @@ def new_sim(
 def _new_past(starts: np.ndarray, ticks: float) -> np.ndarray:
     """Return room for where robots were up to ``ticks`` ago; before the first one they stood."""
     slots = math.ceil(ticks) + 2 if ticks > 0.0 else 0
-    return np.array(np.broadcast_to(starts, (slots, *starts.shape)))
+    return np.array(np.broadcast_to(starts, (slots, *starts.shape)), order="C")
 
 
 def new_records(ticks: int, robots: int, beams: int) -> Records:
