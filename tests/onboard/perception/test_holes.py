@@ -85,3 +85,13 @@ def test_out_of_a_limited_view_the_last_scan_has_not_looked():
     rows.shared["view_first"], rows.shared["view_last"] = 89, 269
     turn = (0.0, 0.0, 30.0 * DEGREE)
     assert after(scan_of(), scan_of(265, 200), moved=turn, rows=rows) == [265]
+
+
+def test_where_odometry_drifts_the_beams_beside_the_place_count():
+    """5 cm after 1 m are 1.6 cm after 10 cm; thrice that are nine beams to either side of a place 0.3 m away."""
+    near, moved = scan_of(), (0.1, 0.0, 0.0)
+    near[175] = 0.2
+    assert after(near, scan_of(180), moved=moved) == []
+    drifting = one_robot(rig_of(odometry_drift_m=0.05))
+    assert after(near, scan_of(180), moved=moved, rows=drifting) == [180]
+    assert after(near, scan_of(180), moved=(0.0, 0.0, 0.0), rows=drifting) == []

@@ -70,15 +70,21 @@ def _move_on(percept: Row, poses: np.ndarray) -> None:
 @jit_inline
 def _astray(pose: np.ndarray, reach: float, rig: Rig) -> float:
     """Return how far what a kept scan shows ``reach`` [m] from here may be from where odometry puts it [m]."""
-    return _drifted(pose, reach, rig) + SIGMAS * rig.guarding.odometry_scale * float(pose[4]) * reach
+    return astray(float(pose[3]), float(pose[4]), reach, rig)
 
 
 @jit_inline
 def _drifted(pose: np.ndarray, reach: float, rig: Rig) -> float:
     """Return the same for the way alone, without the turning."""
-    guarding, way = rig.guarding, float(pose[3])
+    return astray(float(pose[3]), 0.0, reach, rig)
+
+
+@jit_inline
+def astray(way: float, turned: float, reach: float, rig: Rig) -> float:
+    """Return how far a place ``reach`` [m] off may be from where odometry puts it after ``way`` [m] and turns [rad]."""
+    guarding = rig.guarding
     at_random = guarding.odometry_drift_m + guarding.odometry_turn_rad * reach
-    return SIGMAS * (guarding.odometry_scale * way + at_random * math.sqrt(way))
+    return SIGMAS * (guarding.odometry_scale * (way + turned * reach) + at_random * math.sqrt(way))
 
 
 @jit

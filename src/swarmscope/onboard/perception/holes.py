@@ -10,7 +10,7 @@ import math
 from swarmscope._jit import jit, jit_inner
 from swarmscope.geometry import then
 from swarmscope.onboard.perception.beams import beam_at, nearest_beam
-from swarmscope.onboard.perception.frames import in_view
+from swarmscope.onboard.perception.frames import astray, in_view
 from swarmscope.onboard.rig import Rig
 from swarmscope.onboard.view import BROKEN, View
 
@@ -58,9 +58,23 @@ def _looked_through(see: View, n: int) -> bool:
         x, y, _yaw = then(here, (reach * rig.cos[n], reach * rig.sin[n], 0.0))
         if rig.sensor.field > 0 and not in_view(x, y, see):
             return False
-        if not see.kept[nearest_beam(x, y, 0.0, rig.sensor)] > math.sqrt(x * x + y * y):
+        if not _reached_beyond(see, x, y):
             return False
         reach *= 2.0
         if reach >= see.scan[n]:
             break
+    return True
+
+
+@jit_inner
+def _reached_beyond(see: View, x: float, y: float) -> bool:
+    """Tell whether every beam of the last scan that may have looked at (x, y) [m] from there reached beyond it."""
+    rig, way = see.rig, math.sqrt(see.percept["odom_x"] ** 2 + see.percept["odom_y"] ** 2)
+    distance, middle = math.sqrt(x * x + y * y), nearest_beam(x, y, 0.0, rig.sensor)
+    off = astray(way, abs(see.percept["odom_yaw"]), distance, rig)
+    aside = int(math.ceil(off / max(distance, 1e-9) / rig.sensor.increment))
+    for m in range(middle - aside, middle + aside + 1):
+        k = beam_at(m, rig.sensor)
+        if k >= 0 and not see.kept[k] > distance + off:
+            return False
     return True
