@@ -17,9 +17,9 @@ from swarmscope.scenarios.places import make_setup
 from swarmscope.scenarios.read import parse_scenario
 from swarmscope.scenarios.to_kernels import make_rig_of, make_setting
 from swarmscope.sim.cells import index_robots
-from swarmscope.sim.loop import world_phase
+from swarmscope.sim.loop import begin, world_phase
 from swarmscope.sim.sensing import sense
-from swarmscope.sim.state import Clock, Conditions, Start, new_records, new_sim
+from swarmscope.sim.state import new_records
 
 SCENARIO = {"task": {"name": "T1"}, "robots": 2}
 
@@ -39,14 +39,7 @@ def world() -> None:
     """Let the world go on by a tick."""
     scenario = parse_scenario(SCENARIO, "warm")
     setting = make_setting(scenario, make_setup(scenario))
-    sim, swarm = new_sim(
-        setting.world,
-        setting.beams,
-        setting.rig,
-        Start(setting.starts, setting.goals, setting.bounds),
-        Conditions(setting.noise, setting.radio, setting.faults),
-        Clock(int(setting.seed), float(setting.dt), int(setting.substeps)),
-    )
+    sim, swarm = begin(setting)
     index_robots(sim)
     sense(sim, 0, 0, len(setting.starts))
     world_phase(sim, swarm.safe, new_records(1, len(setting.starts), 0), 0, False, 0)

@@ -8,7 +8,7 @@ import pytest
 from swarmscope.scenarios.places import make_setup
 from swarmscope.scenarios.read import parse_scenario
 from swarmscope.scenarios.to_kernels import make_setting
-from swarmscope.sim.state import Clock, Conditions, Start, new_sim
+from swarmscope.sim.loop import begin
 
 PLAIN = {"task": {"name": "T1"}, "robots": 2}
 OTHERS = [
@@ -31,10 +31,7 @@ OTHERS = [
 def kinds(values):
     """The types that kernels are compiled for."""
     scenario = parse_scenario(values, "test")
-    setting = make_setting(scenario, make_setup(scenario))
-    start = Start(setting.starts, setting.goals, setting.bounds)
-    conditions = Conditions(setting.noise, setting.radio, setting.faults)
-    sim, swarm = new_sim(setting.world, setting.beams, setting.rig, start, conditions, Clock(0, setting.dt, 20))
+    sim, swarm = begin(make_setting(scenario, make_setup(scenario)))
     return numba.typeof(sim), numba.typeof(swarm)
 
 

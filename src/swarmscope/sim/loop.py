@@ -181,10 +181,7 @@ def run(
     The result does not depend on ``threads``: every kernel writes only its own robots' rows, random numbers
     are keyed, and what robots do to each other (radio, contacts) happens in the order of the robots.
     """
-    clock = Clock(int(setting.seed), float(setting.dt), int(setting.substeps))
-    start = Start(setting.starts, setting.goals, setting.bounds)
-    conditions = Conditions(setting.noise, setting.radio, setting.faults)
-    sim, swarm = new_sim(setting.world, setting.beams, setting.rig, start, conditions, clock)
+    sim, swarm = begin(setting)
     n = len(setting.starts)
     memory = setting.planner.new_memory(n)
     forgotten = blanks(setting.planner, swarm, memory, setting.faults)
@@ -242,6 +239,14 @@ def run(
         wall_s=wall_s,
         memory_bytes=_row_bytes(swarm, memory),
     )
+
+
+def begin(setting: Setting) -> tuple[Sim, Swarm]:
+    """Return the simulation of a setting at its start, and the rows of its robots."""
+    clock = Clock(int(setting.seed), float(setting.dt), int(setting.substeps))
+    start = Start(setting.starts, setting.goals, setting.bounds)
+    conditions = Conditions(setting.noise, setting.radio, setting.faults)
+    return new_sim(setting.world, setting.beams, setting.rig, start, conditions, clock)
 
 
 def _step(setting: Setting, swarm: Swarm, memory: np.ndarray, first: int, last: int) -> None:

@@ -184,8 +184,9 @@ def returns_of(see: View, t: int, hide: bool) -> float:
     nearest = math.inf
     if d - reach > sensor.range_max:
         return nearest
-    share = reach / d if d > reach else 1.0
-    half_angle = share + (0.5 * math.pi - 1.0) * share**3 if d > reach else math.pi  # asin, or a little more
+    half_angle = math.pi
+    if d > reach:
+        half_angle = reach / d + (0.5 * math.pi - 1.0) * (reach / d) ** 3  # asin, or a little more
     spread = int(math.ceil(half_angle / sensor.increment)) + 1
     centre = int(math.floor((rough_angle(x, y) - sensor.angle_min) / sensor.increment + 0.5))
     if 2 * spread + 1 > sensor.beams:
