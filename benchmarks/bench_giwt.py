@@ -16,6 +16,7 @@ import numpy as np
 
 from bench_step import prepared, step_us
 from swarmscope.errors import SwarmscopeError
+from swarmscope.held import Held
 from swarmscope.onboard.network.answering import draw, empty_graph, gather, look, put_answer
 from swarmscope.onboard.network.graph import FEATURES
 from swarmscope.onboard.network.local_map import CELLS, CHANNELS
@@ -78,8 +79,9 @@ def tick_us(planner: Planner, rows: Rows) -> float:
     best = np.inf
     for _ in range(REPEATS):
         swarm, memory = rows.again()
+        held = Held(swarm)
         start = time.perf_counter_ns()
-        planner.step_all(0, ROBOTS, swarm, memory, planner.params())
+        planner.step_all(0, ROBOTS, held, memory, planner.params())
         best = min(best, (time.perf_counter_ns() - start) / 1e3 / ROBOTS)
     return best
 
@@ -97,9 +99,9 @@ def main() -> None:
         print(f"left out: {error}")
         return
     params, rows, clear = planner.params(), scene(planner, True), scene(planner, False)
-    planner.step_all(0, 0, rows.swarm, rows.memory, params)
+    planner.step_all(0, 0, Held(rows.swarm), rows.memory, params)
     swarm, memory = rows.again()
-    planner.step_all(0, ROBOTS, swarm, memory, params)  # fills the tracks
+    planner.step_all(0, ROBOTS, Held(swarm), memory, params)  # fills the tracks
     decided = int(swarm.decisions["fused"].sum())
     memory = rows.memory
     swarm.shared["ask_n"] = 1

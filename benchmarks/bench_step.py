@@ -10,6 +10,7 @@ import time
 
 import numpy as np
 
+from swarmscope.held import Held
 from swarmscope.onboard.perception.filters import filter_padded, prepare_scan
 from swarmscope.onboard.planners import load_planner
 from swarmscope.onboard.rig import Rig
@@ -80,9 +81,9 @@ def step_us() -> tuple[float, float]:
     best = np.inf
     for _ in range(REPEATS):
         swarm = before._replace(**{name: getattr(before, name).copy() for name in REMEMBERED})
-        memory = planner.new_memory(ROBOTS)
+        held, memory = Held(swarm), planner.new_memory(ROBOTS)
         start = time.perf_counter_ns()
-        planner.step_all(0, ROBOTS, swarm, memory, params)
+        planner.step_all(0, ROBOTS, held, memory, params)
         best = min(best, (time.perf_counter_ns() - start) / 1e3 / ROBOTS)
     if not decisions["fused"].all():
         raise SystemExit("the benchmark's robots did not all choose a side")

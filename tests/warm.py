@@ -11,6 +11,7 @@ from __future__ import annotations
 import sys
 
 from swarmscope.errors import MissingExtraError
+from swarmscope.held import Held
 from swarmscope.onboard.planners import load_planner, planner_names
 from swarmscope.onboard.view import new_swarm
 from swarmscope.scenarios.places import make_setup
@@ -30,7 +31,7 @@ def planners() -> None:
     for name in planner_names():
         try:
             planner = load_planner(name)
-            planner.step_all(0, 1, new_swarm(1, rig), planner.new_memory(1), planner.params())
+            planner.step_all(0, 1, Held(new_swarm(1, rig)), planner.new_memory(1), planner.params())
         except MissingExtraError as error:
             print(error)
 
@@ -42,7 +43,7 @@ def world() -> None:
     sim, swarm = begin(setting)
     index_robots(sim)
     sense(sim, 0, 0, len(setting.starts))
-    world_phase(sim, swarm.safe, new_records(1, len(setting.starts), 0), 0, False, 0)
+    world_phase(Held(sim), swarm.safe, new_records(1, len(setting.starts), 0), 0, False, 0)
 
 
 if __name__ == "__main__":

@@ -66,7 +66,7 @@ except ImportError:
 
 @pytest.mark.parametrize("path", ONBOARD, ids=module_of)
 def test_on_board_modules_import_only_what_a_robot_has(path):
-    ours = ("onboard", "_jit", "geometry", "errors", "members", "bounds", "user_files", "closure")
+    ours = ("onboard", "_jit", "held", "geometry", "errors", "members", "bounds", "user_files", "closure")
     allowed = ("numpy", *(f"swarmscope.{name}" for name in ours))
     library = LIBRARIES.get(path.relative_to(SRC / "onboard").as_posix())
     for name in set(imports_of(path)) - {"swarmscope"}:
@@ -74,7 +74,7 @@ def test_on_board_modules_import_only_what_a_robot_has(path):
         assert name.startswith(allowed) or root in sys.stdlib_module_names or root == library, name
 
 
-@pytest.mark.parametrize("path", [p for p in SOURCES if p.name != "_jit.py"], ids=module_of)
+@pytest.mark.parametrize("path", [p for p in SOURCES if p.name not in ("_jit.py", "held.py")], ids=module_of)
 def test_numba_is_configured_in_one_place(path):
     names = {name.split(".")[0] for name in imports_of(path)}
     assert not names & {"numba", "llvmlite"} or path.parts[-2:] == ("judging", "provenance.py")

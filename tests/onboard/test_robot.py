@@ -28,6 +28,7 @@ from robots import (
     within,
 )
 from swarmscope.errors import ConfigError
+from swarmscope.held import Held
 from swarmscope.onboard.body import Body
 from swarmscope.onboard.lidar import Lidar
 from swarmscope.onboard.percept import MAX_INBOX, MAX_NEIGHBOURS
@@ -76,7 +77,7 @@ def drive_alike(name, lidar, noise):
     world = world_of(Circle(center=(0.0, 0.0), radius=0.5), Circle(center=(-1.2, 0.6), radius=0.2))
     sensor = all_round(make_sensor(lidar.beams, math.radians(lidar.fov_deg), lidar.range_m))
     sim, swarm = place_sim(starts, goals, world, rig_of(sensor=sensor, speed_step_mps=Safety().speed_step_mps), noise)
-    memory = planner.new_memory(4)
+    held, memory = Held(swarm), planner.new_memory(4)
     boots = sim.percepts["boot"].tolist()
     robots = [new_robot(name, lidar, address=i, boot=boot) for i, boot in enumerate(boots)]
     index_robots(sim)
@@ -84,7 +85,7 @@ def drive_alike(name, lidar, noise):
     for tick in range(60):
         sense(sim, tick, 0, 4)
         commands = [tick_as(robot, sim, i) for i, robot in enumerate(robots)]  # the step writes into what it is given
-        planner.step_all(0, 4, swarm, memory, planner.params())
+        planner.step_all(0, 4, held, memory, planner.params())
         for i, (robot, command) in enumerate(zip(robots, commands, strict=True)):
             d = sim.decisions[i]
             assert command[:2] == (d["v"], d["w"]), (tick, i, command)

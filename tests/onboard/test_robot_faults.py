@@ -277,8 +277,8 @@ def test_a_planner_that_asks_for_the_impossible_brakes():
     driver = Driver()
 
     class Wild:
-        def step_all(self, first, last, swarm, memories, params):
-            swarm.decisions["v"], swarm.decisions["w"] = NAN, 1e9
+        def step_all(self, first, last, held, memories, params):
+            held.what.decisions["v"], held.what.decisions["w"] = NAN, 1e9
 
     driver.robot.rows.planner = Wild()
     assert brakes(driver.tick())

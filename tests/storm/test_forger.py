@@ -74,13 +74,14 @@ def test_packets_thrown_together_arrive_as_those_thrown_one_by_one(kind):
     def digest(one_by_one):
         attack, thrown = Attack(Forger(3, 30.0, (kind,))), []
 
-        def between(sim, tick):
+        def between(held, tick):
+            sim = held.what
             args = attack._rng, attack.forger.per_tick, attack._kinds, sim.decisions, sim.percepts, attack._heard
             to, length, data = prepare(*args)
             if one_by_one:
                 thrown.append(sum(throw(sim, tick, to[k], data[k], length[k]) for k in range(to.size)))
             else:
-                thrown.append(throw_all(sim, tick, to, data, length))
+                thrown.append(throw_all(held, tick, to, data, length))
             return tick == 30
 
         values = place_scenario([(-2.0, 0.0, 0.0), (2.0, 0.2, 3.0)], [(2.0, 0.0), (-2.0, 0.2)], [], limit_s=20.0)

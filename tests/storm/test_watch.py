@@ -29,12 +29,12 @@ def spoiled(tick, **fields):
     setting = setting_of()
     watch = Watch(setting)
 
-    def between(sim, now):
+    def between(held, now):
         if now == tick:
             for name, value in fields.items():
-                rows = sim.decisions if name in ("v", "w") else sim.robots
+                rows = held.what.decisions if name in ("v", "w") else held.what.robots
                 rows["v" if name == "speed" else name][1] = value
-        return watch(sim, now)
+        return watch(held, now)
 
     trace = run(setting, between=between)
     watch.finish(trace)
@@ -79,9 +79,9 @@ def test_a_run_in_which_nobody_drives_any_more_ends(monkeypatch):
     setting = setting_of()
     watch = Watch(setting)
 
-    def between(sim, tick):
-        sim.decisions["v"] = 0.0
-        return watch(sim, tick)
+    def between(held, tick):
+        held.what.decisions["v"] = 0.0
+        return watch(held, tick)
 
     trace = run(setting, between=between)
     assert len(trace.t_s) == 11
@@ -106,6 +106,6 @@ def test_an_adversary_throws_packets_and_nobody_touches_anything(kind):
 def test_its_packets_are_read():
     setting = setting_of()
     attack = Attack(Forger(1, 10.0, ("rubbish", "forged", "answers")))
-    trace = run(setting, between=lambda sim, tick: attack.strike(sim, tick) is not None)
+    trace = run(setting, between=lambda held, tick: attack.strike(held, tick) is not None)
     assert trace.shared["dropped_bad"].sum() > 20
     assert trace.robots["sent_features"].sum() > run(setting).robots["sent_features"].sum()  # it is answered

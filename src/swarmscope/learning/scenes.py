@@ -20,6 +20,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from swarmscope.held import Held
 from swarmscope.judging.sides import judged_by
 from swarmscope.learning.labels import LABELLED, OUTCOMES, Label, label
 from swarmscope.learning.views import look
@@ -213,9 +214,10 @@ class Recorder(Planner):
 
     key_points: list[list[Node]] = field(default_factory=list)
 
-    def step_all(self, first: int, last: int, swarm: Swarm, memories: Any, params: Any) -> None:
+    def step_all(self, first: int, last: int, held: Held[Swarm], memories: Any, params: Any) -> None:
         """Run one tick of robots ``first`` to ``last - 1``."""
-        super().step_all(first, last, swarm, memories, params)
+        super().step_all(first, last, held, memories, params)
+        swarm = held.what
         for i in np.flatnonzero(swarm.decisions["fused"][first:last]) + first:
             self.key_points.append(_nodes(swarm, int(i)))
 

@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 
 from swarmscope._jit import jit_for
+from swarmscope.held import Held
 from swarmscope.onboard.control.guard import guard
 from swarmscope.onboard.tick import guard_all, perceive, perceive_all
 from swarmscope.onboard.view import Swarm, python_view, view_of
 
-Step = Callable[[int, int, Swarm, np.ndarray, Any, float], None]
-"""(first, last, swarm, memories, params, still_s): one tick of robots ``first`` to ``last - 1``."""
+Step = Callable[[int, int, Held[Swarm], np.ndarray, Any, float], None]
+"""(first, last, held, memories, params, still_s): one tick of robots ``first`` to ``last - 1``."""
 
 
 def is_compiled(function: Callable[..., Any]) -> bool:
@@ -42,7 +43,8 @@ def compiled_step(decide: Callable[..., None], module: ModuleType) -> Step:
     return step
 
 
-def _each(first: int, last: int, swarm: Swarm, memories: np.ndarray, params: Any, still_s: float) -> None:
+def _each(first: int, last: int, held: Held[Swarm], memories: np.ndarray, params: Any, still_s: float) -> None:
+    swarm = held.what
     for i in range(first, last):
         see = view_of(swarm, i)
         perceive(see, still_s)
@@ -53,11 +55,11 @@ def _each(first: int, last: int, swarm: Swarm, memories: np.ndarray, params: Any
 def plain_step(decide: Callable[..., None]) -> Step:
     """Return the loop round a plain Python ``decide``: a thousand times slower, easy to write and to look into."""
 
-    def step(first: int, last: int, swarm: Swarm, memories: np.ndarray, params: Any, still_s: float) -> None:
-        perceive_all(first, last, swarm, still_s)
+    def step(first: int, last: int, held: Held[Swarm], memories: np.ndarray, params: Any, still_s: float) -> None:
+        perceive_all(first, last, held, still_s)
         for i in range(first, last):
-            decide(python_view(swarm, i), memories[i], params)
-        guard_all(first, last, swarm)
+            decide(python_view(held.what, i), memories[i], params)
+        guard_all(first, last, held)
 
     return step
 
@@ -65,9 +67,9 @@ def plain_step(decide: Callable[..., None]) -> Step:
 def batch_step(decide_all: Callable[..., None], *more: Any) -> Step:
     """Return the loop round a decision that is made for all robots at once, as libraries want it."""
 
-    def step(first: int, last: int, swarm: Swarm, memories: np.ndarray, params: Any, still_s: float) -> None:
-        perceive_all(first, last, swarm, still_s)
-        decide_all(first, last, swarm, memories, params, *more)
-        guard_all(first, last, swarm)
+    def step(first: int, last: int, held: Held[Swarm], memories: np.ndarray, params: Any, still_s: float) -> None:
+        perceive_all(first, last, held, still_s)
+        decide_all(first, last, held.what, memories, params, *more)
+        guard_all(first, last, held)
 
     return step

@@ -27,6 +27,7 @@ import numpy as np
 
 from swarmscope.bounds import Field, converted, fields_of
 from swarmscope.errors import ConfigError, InputFileError
+from swarmscope.held import Held
 from swarmscope.members import Kind, Need, check, find, is_text, load, names_of, text
 from swarmscope.onboard.loops import Step, batch_step, compiled_step, is_compiled, plain_step
 from swarmscope.onboard.reasons import REASON_NAMES, STATE_NAMES
@@ -125,17 +126,17 @@ class Planner:
             return compiled_step(self.module.decide, self.module)
         return plain_step(self.module.decide)
 
-    def step_all(self, first: int, last: int, swarm: Swarm, memories: np.ndarray, params: Any) -> None:
+    def step_all(self, first: int, last: int, held: Held[Swarm], memories: np.ndarray, params: Any) -> None:
         """Run one tick of robots ``first`` to ``last - 1``, from scan to command; for none it loads the kernels.
 
         What is wrong with a planner from outside raises InputFileError with its file and line.
         """
         still_s = float(getattr(params, "still_s", STILL_S))
         if not self._from_outside:
-            self._step(first, last, swarm, memories, params, still_s)
+            self._step(first, last, held, memories, params, still_s)
             return
-        guarded(lambda: self._step(first, last, swarm, memories, params, still_s), self._place)
-        self._check_words(swarm.decisions[first:last])
+        guarded(lambda: self._step(first, last, held, memories, params, still_s), self._place)
+        self._check_words(held.what.decisions[first:last])
 
     @property
     def _place(self) -> Path:

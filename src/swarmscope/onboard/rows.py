@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from swarmscope.held import Held
 from swarmscope.onboard.percept import DECISION, PERCEPT, Row
 from swarmscope.onboard.perception.clock import skip_to
 from swarmscope.onboard.planners import Planner
@@ -20,6 +21,7 @@ class Rows:
         self.rig, self.params, self.planner = rig, params, planner
         self.swarm, self.memories = new_swarm(1, rig), planner.new_memory(1)
         self.swarm.percepts["id"], self.swarm.percepts["boot"] = address, boot
+        self._held = Held(self.swarm)
         self._given = {name: self.swarm.percepts[name] for name in PERCEPT.names or ()}
         self._said = {name: self.swarm.decisions[name] for name in DECISION.names or ()}
 
@@ -84,11 +86,11 @@ class Rows:
 
     def step(self) -> None:
         """Run one tick of the planner and the guard."""
-        self.planner.step_all(0, 1, self.swarm, self.memories, self.params)
+        self.planner.step_all(0, 1, self._held, self.memories, self.params)
 
     def load(self) -> None:
         """Compile or load whatever a tick needs; changes nothing."""
-        self.planner.step_all(0, 0, self.swarm, self.memories, self.params)
+        self.planner.step_all(0, 0, self._held, self.memories, self.params)
 
     def said(self, name: str) -> Any:
         """Return a field of the decision as a plain number."""

@@ -6,6 +6,7 @@ perceive (packets, poses, scan, safe directions) -> share (own features, answers
 from __future__ import annotations
 
 from swarmscope._jit import jit, jit_inline, jit_paste
+from swarmscope.held import Held
 from swarmscope.onboard.control.guard import guard
 from swarmscope.onboard.perception.bearings import steady
 from swarmscope.onboard.perception.clock import keep_time
@@ -82,14 +83,16 @@ def own_features(see: View) -> int:
 
 
 @jit
-def perceive_all(first: int, last: int, swarm: Swarm, still_s: float) -> None:
+def perceive_all(first: int, last: int, held: Held[Swarm], still_s: float) -> None:
     """Let robots ``first`` to ``last - 1`` perceive."""
+    swarm = held.what
     for i in range(first, last):
         perceive(view_of(swarm, i), still_s)
 
 
 @jit
-def guard_all(first: int, last: int, swarm: Swarm) -> None:
+def guard_all(first: int, last: int, held: Held[Swarm]) -> None:
     """Let the guard have the last word on the commands of robots ``first`` to ``last - 1``."""
+    swarm = held.what
     for i in range(first, last):
         guard(view_of(swarm, i))

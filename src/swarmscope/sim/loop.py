@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from swarmscope._jit import jit, jit_inner
+from swarmscope.held import Held
 from swarmscope.onboard.planners import Planner
 from swarmscope.onboard.reasons import CRASHED, R_COLLIDED
 from swarmscope.onboard.rig import Rig
@@ -139,9 +140,10 @@ def _log_choices(sim: Sim, tick: int) -> None:
 
 @jit
 def world_phase(
-    sim: Sim, safe: np.ndarray, records: Records, row: int, with_scans: bool, tick: int
+    held: Held[Sim], safe: np.ndarray, records: Records, row: int, with_scans: bool, tick: int
 ) -> bool:
     """Record tick ``tick``, then exchange, move, judge and sense the next; return whether everybody is done."""
+    sim = held.what
     record_tick(sim, safe, records, row, with_scans, tick)
     exchange(sim, tick)
     move(sim, tick, 0, sim.robots.size)
@@ -167,8 +169,8 @@ def _sense_next(sim: Sim, tick: int) -> bool:
     return False
 
 
-Between = Callable[[Sim, int], bool]
-"""``(sim, tick)``, called when everybody has decided and nothing has been sent or driven yet; True: the last tick."""
+Between = Callable[[Held[Sim], int], bool]
+"""``(held, tick)``, called when everybody has decided and nothing has been sent or driven yet; True: the last tick."""
 
 
 def run(
@@ -176,7 +178,7 @@ def run(
 ) -> Trace:
     """Run to the end; ``progress(simulated seconds, robots done)`` is called every now and then.
 
-    ``between`` looks at every tick, may throw packets at robots (`radio.throw`), and may end the run with it.
+    ``between`` looks at every tick, may throw packets at robots (`radio.throw_all`), and may end the run with it.
 
     The result does not depend on ``threads``: every kernel writes only its own robots' rows, random numbers
     are keyed, and what robots do to each other (radio, contacts) happens in the order of the robots.
@@ -185,7 +187,8 @@ def run(
     n = len(setting.starts)
     memory = setting.planner.new_memory(n)
     forgotten = blanks(setting.planner, swarm, memory, setting.faults)
-    step_all = partial(_step, setting, swarm, memory)
+    held = Held(sim)
+    step_all = partial(_step, setting, Held(swarm), memory)
     beams = sim.ranges.shape[1] if setting.record_scans else 0
     ticks = math.ceil(setting.limit_s / setting.dt - 1e-9)
     chunks: list[Records] = []
@@ -211,9 +214,9 @@ def run(
             pool.each(step_all)
         for rows, blank in forgotten:
             forget(sim, tick, rows, blank)
-        last = between is not None and between(sim, tick)
+        last = between is not None and between(held, tick)
         if pool.size == 1:
-            done = world_phase(sim, swarm.safe, chunks[-1], row, beams > 0, tick)
+            done = world_phase(held, swarm.safe, chunks[-1], row, beams > 0, tick)
         else:
             record_tick(sim, swarm.safe, chunks[-1], row, beams > 0, tick)
             exchange(sim, tick)
@@ -249,9 +252,9 @@ def begin(setting: Setting) -> tuple[Sim, Swarm]:
     return new_sim(setting.world, setting.beams, setting.rig, start, conditions, clock)
 
 
-def _step(setting: Setting, swarm: Swarm, memory: np.ndarray, first: int, last: int) -> None:
+def _step(setting: Setting, held: Held[Swarm], memory: np.ndarray, first: int, last: int) -> None:
     """Run one tick of robots ``first`` to ``last - 1``."""
-    setting.planner.step_all(first, last, swarm, memory, setting.params)
+    setting.planner.step_all(first, last, held, memory, setting.params)
 
 
 def _time_steps(step_all: Callable[[int, int], None], robots: int) -> list[float]:

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from swarmscope._jit import jit, jit_inner
+from swarmscope.held import Held
 from swarmscope.onboard.percept import MAX_OUTBOX
 from swarmscope.onboard.sharing.message import MAX_PACKET_BYTES, is_request
 from swarmscope.sim.faults import is_off_air
@@ -102,9 +103,9 @@ def throw(sim: Sim, tick: int, j: int, data: np.ndarray, length: int) -> bool:
 
 
 @jit
-def throw_all(sim: Sim, tick: int, to: np.ndarray, data: np.ndarray, length: np.ndarray) -> int:
+def throw_all(held: Held[Sim], tick: int, to: np.ndarray, data: np.ndarray, length: np.ndarray) -> int:
     """Throw packets ``data`` (K, bytes) at robots ``to`` (K,), one after the other; return how many are heard."""
-    heard = 0
+    sim, heard = held.what, 0
     for k in range(to.size):
         heard += throw(sim, tick, to[k], data[k], length[k])
     return heard

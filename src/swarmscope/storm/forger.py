@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from swarmscope._jit import jit_alloc
+from swarmscope.held import Held
 from swarmscope.onboard.sharing.codes import put_checksum, put_u16
 from swarmscope.onboard.sharing.message import (
     KIND_LATENT,
@@ -76,13 +77,14 @@ class Attack:
         self._kinds = np.array([KINDS.index(kind) for kind in forger.kinds])
         self._heard = _nothing_heard()
 
-    def strike(self, sim: Sim, tick: int) -> None:
+    def strike(self, held: Held[Sim], tick: int) -> None:
         """Hear what is being sent, then throw."""
+        sim = held.what
         to, length, data = prepare(
             self._rng, float(self.forger.per_tick), self._kinds, sim.decisions, sim.percepts, self._heard
         )
         if to.size > 0:
-            self.thrown += throw_all(sim, tick, to, data, length)
+            self.thrown += throw_all(held, tick, to, data, length)
 
 
 @jit_alloc

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from swarmscope._jit import jit
+from swarmscope.held import Held
 from swarmscope.onboard.reasons import STATE_NAMES
 from swarmscope.onboard.sharing.message import MAX_PACKET_BYTES
 from swarmscope.sim.loop import Setting, Trace
@@ -112,15 +113,16 @@ class Watch:
         """Seconds in which they drove."""
         return float(self._counts.driving[0]) * self._setting.dt
 
-    def __call__(self, sim: Sim, tick: int) -> bool:
+    def __call__(self, held: Held[Sim], tick: int) -> bool:
         """Check what was decided and what the tick before did; return whether the run ends."""
+        sim = held.what
         odd = look(sim.robots, sim.decisions, tick, self._may, self._counts)
         found = self._found(sim, tick) if odd else None
         if found is not None:
             self.breach = Breach(found[0], tick, found[1], found[2])
             return True
         if self.attack is not None:
-            self.attack.strike(sim, tick)
+            self.attack.strike(held, tick)
         return bool((tick - self._counts.drove[0]) * self._setting.dt >= STOOD_S)
 
     def finish(self, trace: Trace) -> None:

@@ -13,6 +13,7 @@ from swarmscope.onboard.perception.lost import MEMORY, WITHIN, keep_lost
 from swarmscope.onboard.perception.mend import mend
 from swarmscope.onboard.sensor import all_round
 from swarmscope.onboard.sharing.tracks import update_odometry, update_tracks
+from swarmscope.onboard.view import BROKEN
 
 AHEAD = 180
 """The beam straight ahead; beams are 1 degree apart."""
@@ -101,6 +102,35 @@ def test_between_two_beams_the_one_that_does_not_see_it_keeps_it_unless_the_othe
     assert after(before, scan_of(at_179=4.0, at_180=4.0), turned) == {179: 4.0, 180: 4.0}
     assert after(before, scan_of(at_179=2.05), turned) == {179: 2.05}
     assert after(before, scan_of(at_179=1.0), turned) == {179: 1.0}
+
+
+def test_the_end_of_a_wall_stays_nearer_than_the_hole_that_hides_it_is_bridged():
+    """A wall comes nearer towards its end at 0.30 m, the beam beside it says 0.36 m; that end is broken twice."""
+    rows, wall = one_robot(), scan_of(at_180=0.30, at_181=0.36, at_182=0.43, at_179=2.3)
+    broken = scan_of(at_180=np.nan, at_181=0.36, at_182=0.43, at_179=2.3)
+    assert returns(given(one_robot(), broken))[180] == pytest.approx(0.36, abs=0.01)
+    given(rows, wall)
+    for _ in range(2):
+        assert returns(given(rows, broken)) == {179: 2.3, 180: 0.30, 181: 0.36, 182: 0.43}
+
+
+def test_through_a_hole_nobody_looks_farther_than_to_what_bridges_it():
+    """Behind a broken beam 1 m away nothing has been seen when the next scan is broken there and 3 m to its sides."""
+    near = np.full(360, 3.0, np.float32)
+    near[178:183] = 1.0
+    hole, far = near.copy(), np.full(360, 3.0, np.float32)
+    hole[180] = far[180] = np.nan
+    rows = one_robot()
+    given(rows, near)
+    given(rows, hole)
+    assert not rows.view.unseen[180] & BROKEN
+    assert rows.view.kept[180] == pytest.approx(1.0, abs=0.02)  # it was there, and is kept
+    rows = one_robot()
+    for scan in (np.full(360, 3.0, np.float32), hole):
+        given(rows, scan)
+    assert rows.view.kept[180] == pytest.approx(-1.0, abs=0.02)
+    given(rows, far)
+    assert rows.view.unseen[180] & BROKEN
 
 
 def test_what_is_near_is_found_again_where_it_has_gone_in_a_step():

@@ -10,6 +10,7 @@ import pytest
 
 from giwt_models import make_model
 from helpers import DT, circle, circles_world, place_scenario, rig_of, run_scenario, scan_at
+from swarmscope.held import Held
 from swarmscope.onboard.network.graph import (
     OWN_CELL,
     VIEW_M,
@@ -91,7 +92,7 @@ class Robots:
                 self.percepts["neighbour_yaw"][i, k] = yaw
 
     def step(self):
-        self.planner.step_all(0, len(self.percepts), self.swarm, self.memories, self.params)
+        self.planner.step_all(0, len(self.percepts), Held(self.swarm), self.memories, self.params)
         self.percepts["now_s"] += DT
         self.percepts["n_packets"] = 0
         return self

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from giwt_models import make_model
 from helpers import DT, circles_world, mirrored, one_robot, place_scenario, rig_of, run_scenario, scan_at, seen, tick
+from swarmscope.held import Held
 from swarmscope.onboard.percept import MAX_OUTBOX, PERCEPT
 from swarmscope.onboard.planners import load_planner, planner_names
 from swarmscope.onboard.reasons import ARRIVED, REASON_NAMES, STATE_NAMES
@@ -125,7 +126,7 @@ def test_a_step_changes_its_own_rows_only(name):
     before = [a.copy() for a in arrays]
     given = swarm.scans.tobytes(), swarm.percepts.tobytes()
     decided = swarm.decisions[1].tobytes()
-    planner.step_all(1, 2, swarm, memories, params)
+    planner.step_all(1, 2, Held(swarm), memories, params)
     for a, b in zip(arrays, before, strict=True):
         assert a[0].tobytes() == b[0].tobytes()
         assert a[2].tobytes() == b[2].tobytes()
@@ -139,9 +140,9 @@ def test_the_number_of_robots_in_a_call_does_not_matter(name):
     for swarm in (together, apart):
         for k in range(3):
             swarm.scans[k] = scan_at(circles_world([(1.0, 0.2 * k - 0.2, 0.3), (0.0, 1.0 + k, 0.5)]), swarm.rig)
-    planner.step_all(0, 3, together, memories, params)
+    planner.step_all(0, 3, Held(together), memories, params)
     for k in (2, 0, 1):
-        planner.step_all(k, k + 1, apart, other_memories, params)
+        planner.step_all(k, k + 1, Held(apart), other_memories, params)
     assert together.decisions.tobytes() == apart.decisions.tobytes()
 
 

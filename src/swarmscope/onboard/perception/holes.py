@@ -75,6 +75,6 @@ def _reached_beyond(see: View, x: float, y: float) -> bool:
     aside = int(math.ceil(off / max(distance, 1e-9) / rig.sensor.increment))
     for m in range(middle - aside, middle + aside + 1):
         k = beam_at(m, rig.sensor)
-        if k >= 0 and not see.kept[k] > distance + off:
+        if k >= 0 and not abs(see.kept[k]) > distance + off:
             return False
     return True

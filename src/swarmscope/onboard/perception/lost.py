@@ -1,8 +1,8 @@
 """Returns that were there a moment ago: a beam that says nothing has not shown that their place is free.
 
 What stood within range is kept where it was, moved by odometry, for ``Guarding.lost_s``, where one of the two beams on
-either side of the place now says nothing or is broken, and the other one does not show it. A LiDAR that loses too much
-is noticed.
+either side of the place now says nothing and the other one does not show it, or where it is broken: the end of a wall
+is nearer than the hole that hides it is bridged. A LiDAR that loses too much is noticed.
 """
 
 from __future__ import annotations
@@ -71,15 +71,15 @@ def _keep_broken(see: View) -> None:
     for n in range(see.rig.sensor.beams):
         see.unseen[n] = BROKEN if see.safe[n] == 1 else 0
         if see.safe[n]:
-            see.kept[n] = math.inf if see.safe[n] == LOOKED_THROUGH else 0.0
+            see.kept[n] = -see.scan[n] if see.safe[n] == LOOKED_THROUGH else 0.0
 
 
 @jit_inner
 def _write_back(see: View) -> None:
-    """Write what was lost into the scan and into the kept one."""
+    """Write what was lost into the scan and into the kept one; a bridge just before it stands for it."""
     for n in range(see.rig.sensor.beams):
-        if see.filtered[n] < see.scan[n]:
-            see.scan[n] = see.kept[n] = see.filtered[n]
+        if see.filtered[n] < see.scan[n] + SAME_M:
+            see.scan[n] = see.kept[n] = min(see.filtered[n], see.scan[n])
             see.unseen[n] += see.edges[n]
 
 
@@ -176,16 +176,20 @@ def _lost_by(see: View, x: float, y: float) -> int:
     between = (rough_angle(x, y) - rig.sensor.angle_min) / rig.sensor.increment
     low = int(math.floor(between))
     first = low + 1 if between - low > 0.5 else low  # the nearer of the two goes first
-    lost_by = -1
+    lost_by, shown = -1, False
     for beam in (2 * low + 1 - first, first):
         k = beam_at(beam, rig.sensor)
         if k < 0:
             return -1
         if not _sees(see, k):
             lost_by = k
-        elif see.scan[k] < distance + SAME_M or abs(between - beam) < THROUGH:
+        elif abs(between - beam) < THROUGH:
             return -1
-    if lost_by < 0 or not least_range(rig) <= distance < WITHIN * rig.sensor.range_max:
+        else:
+            shown |= see.scan[k] < distance + SAME_M
+    if lost_by < 0 or (shown and not see.safe[lost_by]):
+        return -1
+    if not least_range(rig) <= distance < WITHIN * rig.sensor.range_max:
         return -1
     if rig.sensor.field > 0 and not in_view(x, y, see):
         return -1

@@ -29,20 +29,22 @@ class Rule(NamedTuple):
     margin: float = 0.0
 
 
-def blocking_half_angle(s: float, footprint: float, rule: Rule) -> float:
-    """Return how far [rad] to either side a return at range ``s`` [m] makes directions unsafe (0 = not at all).
+def blocking_half_angle(s: np.ndarray, footprint: float, rule: Rule) -> np.ndarray:
+    """Return how far [rad] to either side returns at ranges ``s`` [m] make directions unsafe (0 = not at all).
 
     The largest of three rules. Nav-SCOPE (3): alpha/2 when ``s < l_th``. Swept footprint (readings 3): a disc
     of radius ``footprint`` that leaves along a direction clips the return unless it is asin(footprint / s)
     away, the whole half-plane when the return is closer than the footprint. Look-ahead: a way that keeps
     ``margin`` from the return, asin(margin / s), when ``s < look_ahead``.
     """
-    half = 0.0
-    if s < rule.l_th:
-        half = max(rule.half_alpha, math.asin(min(1.0, footprint / s)) if s > footprint else 0.5 * math.pi)
-    if s < rule.look_ahead:
-        half = max(half, math.asin(rule.margin / s) if s > rule.margin else 0.5 * math.pi)
-    return half
+    swept = np.where(s < rule.l_th, np.maximum(rule.half_alpha, _half_angle_of(footprint, s)), 0.0)
+    ahead = np.where(s < rule.look_ahead, _half_angle_of(rule.margin, s), 0.0)
+    return np.maximum(swept, ahead)
+
+
+def _half_angle_of(radius: float, s: np.ndarray) -> np.ndarray:
+    """Return the half angle [rad] of a disc of ``radius`` at distances ``s``, a right angle within it."""
+    return np.asarray(np.arcsin(np.divide(radius, s, out=np.ones(np.shape(s)), where=s > radius)))
 
 
 def reach_table(increment: float, range_max: float, footprint: float, rule: Rule) -> np.ndarray:
@@ -56,14 +58,11 @@ def reach_table(increment: float, range_max: float, footprint: float, rule: Rule
     table[BINS] = 0
     table[BORDER] = math.ceil(max(rule.half_alpha, UNSEEN_HALF_ANGLE) / increment - 1e-6)
     table[:BINS] = -1
-    blocking = max(rule.l_th, rule.look_ahead)
-    for k in range(BINS):
-        if k * range_max / BINS >= blocking:
-            break  # and nothing beyond
-        half = blocking_half_angle(k * range_max / BINS, footprint, rule)
-        table[k] = math.ceil(half / increment - 1e-6) if half > 0.0 else -1
-        if half > 0.0:
-            table[BINS] = k + 1
+    half = blocking_half_angle(np.arange(BINS) * range_max / BINS, footprint, rule)
+    blocks = np.flatnonzero(half > 0.0)
+    table[blocks] = np.ceil(half[blocks] / increment - 1e-6)
+    if blocks.size > 0:
+        table[BINS] = blocks[-1] + 1
     return table
 
 
