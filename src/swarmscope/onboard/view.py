@@ -50,8 +50,8 @@ class View(NamedTuple):
     scan: np.ndarray
     """(M,) float32: ranges as measured [m]; inf = no return, NaN = broken."""
     kept: np.ndarray
-    """(M,) float32: the scan of the last tick with what it had lost; 0 = there was none, negative = up to where a broken
-    beam's hole was looked through."""
+    """(M,) float32: the scan of the last tick with what it had lost; 0 = there was none, negative = up to where one has
+    looked through a broken beam's hole."""
     unseen: np.ndarray
     """(M,) uint8: for how many ticks what is kept there has not been seen, plus GUARD_ALONE and BROKEN."""
     misses: np.ndarray

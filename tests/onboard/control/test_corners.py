@@ -7,10 +7,12 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
 
 from helpers import one_robot, rig_of, scan_at, world_of
 from swarmscope.onboard.body import Body
-from swarmscope.onboard.control.corners import Corner, apart_round, hidden_at, way_round
+from swarmscope.onboard.control.corners import Corner, apart_round, come_along, hidden_at, way_round
 from swarmscope.onboard.control.guard import guard
 from swarmscope.sim.world import Wall
 from swarmscope.storm.draw import Case
@@ -30,20 +32,62 @@ def test_the_way_round_is_tangent_arc_and_tangent():
     """Corner 1 m ahead, opening to the left; both keep 0.2 m off; to a place 0.2 m beyond and 0.3 m to the right."""
     corner = Corner(1.0, 0.0, 1.0, 1.0, 0.0, 0.2)
     arc = math.atan2(0.3, 0.2) + math.pi - math.acos(0.2) - math.acos(0.2 / math.hypot(0.2, 0.3))
-    assert way_round(0.0, 0.0, 1.2, 0.3, corner) == pytest.approx(math.sqrt(0.96) + 0.3 + 0.2 * arc)
-    assert way_round(0.0, 0.0, 1.2, 0.3, corner) == pytest.approx(1.6342, abs=1e-4)
+    way = way_round(1.2, 0.3, corner)
+    assert way.length == pytest.approx(math.sqrt(0.96) + 0.3 + 0.2 * arc)
+    assert way.length == pytest.approx(1.6342, abs=1e-4)
+
+
+def test_how_far_a_robot_has_come_round_a_corner():
+    """The way touches the arc 0.2 m off the corner at (0.96, 0.196); off the way only what lies along it counts."""
+    corner = Corner(1.0, 0.0, 1.0, 1.0, 0.0, 0.2)
+    way, first = way_round(1.2, 0.3, corner), math.sqrt(0.96)
+    ahead = np.array([first, 0.2])  # the direction of the first part
+    assert come_along(0.0, 0.0, way, corner) == pytest.approx(0.0)
+    assert come_along(*(0.5 * ahead), way, corner) == pytest.approx(0.5)
+    assert come_along(*(0.5 * ahead + np.array([-0.06, 0.3])), way, corner) == pytest.approx(0.5, abs=0.01)
+    for off in (0.2, 0.7):
+        beside = 1.0 + off * math.cos(0.9), off * math.sin(0.9)
+        assert come_along(*beside, way, corner) == pytest.approx(first + 0.2 * (math.pi - 0.9 - math.acos(0.2)))
+    assert come_along(1.2, -0.3, way, corner) == pytest.approx(way.length)
 
 
 def test_where_the_corner_is_not_between_the_way_is_straight():
-    corner = Corner(1.0, 0.0, 1.0, 1.0, 0.0, 0.2)
-    assert way_round(1.5, 0.5, 1.3, 0.3, corner) == pytest.approx(math.hypot(0.2, 0.8))
+    corner = Corner(1.0, 0.0, 1.0, 1.0, 0.6, 0.2)
+    way = way_round(2.0, 0.1, corner)
+    assert way.length == pytest.approx(math.hypot(2.0, 0.1))
+    assert come_along(0.0, 0.0, way, corner) == pytest.approx(0.0)
+    assert come_along(1.0, 0.4, way, corner) == pytest.approx((2.0 - 0.04) / math.hypot(2.0, 0.1))
+    assert come_along(2.0, -0.1, way, corner) == pytest.approx(way.length)
 
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_a_way_round_is_the_same_in_the_mirror(side):
     corner = Corner(0.8, side * 0.6, float(side), 0.7, 0.01, 0.17)
     mirror = Corner(0.8, -side * 0.6, -float(side), 0.7, 0.01, 0.17)
-    assert way_round(0.1, 0.2, 0.9, 0.15, corner) == pytest.approx(way_round(0.1, -0.2, 0.9, 0.15, mirror))
+    ways = way_round(0.9, 0.15, corner), way_round(0.9, 0.15, mirror)
+    assert ways[0] == pytest.approx(ways[1])
+    assert come_along(0.1, 0.2, ways[0], corner) == pytest.approx(come_along(0.1, -0.2, ways[1], mirror))
+
+
+lengths = st.floats(0.02, 3.0)
+
+
+@given(st.floats(0.1, 2.0), st.floats(0.05, 0.5), lengths, lengths, st.data())
+def test_nobody_comes_along_faster_than_he_drives(x, keeps, along, beside, data):
+    """That is what rule 4 of docs/safety.md needs of lengths round a corner; of places that keep off it."""
+    corner = Corner(1.0, 0.0, 1.0, x, 0.0, keeps)
+    way = way_round(x + along, beside, corner)
+    angle, off = st.floats(-math.pi, 1.5), st.floats(0.0, 2.0)
+
+    def place():
+        a, r = data.draw(angle), keeps + data.draw(off)
+        return x + r * math.cos(a), -r * math.sin(a)
+
+    a, b = place(), place()
+    gap = math.dist(a, b)
+    nearest = min(math.hypot(x - a[0] - t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])) for t in np.linspace(0, 1, 50))
+    assume(nearest >= keeps)
+    assert abs(come_along(*a, way, corner) - come_along(*b, way, corner)) <= gap + 1e-6
 
 
 def test_bodies_that_touch_round_a_corner_are_a_chord_of_the_circle_that_both_keep_off():

@@ -33,6 +33,21 @@ class Corner(NamedTuple):
     """What centres keep off the corner [m]."""
 
 
+class Round(NamedTuple):
+    """The shortest way round a corner, in the frame of that corner."""
+
+    length: float
+    first: float
+    """Length of what leads straight up to the arc; of a way that is straight, to where it passes the corner."""
+    arc: float
+    """How far it turns round the corner [rad]."""
+    near: float
+    """Radius of the arc; 0: the way is straight."""
+    c: float
+    """Direction from the corner to where the arc begins, or the way passes."""
+    s: float
+
+
 @jit_inline
 def matters_up_to(way: Way, met: float, rig: Rig) -> float:
     """Return from how far along a line of sight on robots do not matter for a way [m], measured from this robot.
@@ -109,29 +124,49 @@ def _clear_past(see: View, n: int, side: int, way: Way, met: float, enough: floa
     m, near, turned = beam_at(n + side, rig.sensor), _nearer(rig) * see.scan[n], rig.sensor.increment
     corner = Corner(rig.cos[m], rig.sin[m], float(side), near * math.cos(turned), near * math.sin(turned), keeps)
     along = max(along, corner.x + keeps)  # there it is the shortest way
-    now = way_round(0.0, 0.0, along, radius, corner)
-    moved = now - way_round(way.x4, way.y4, along, radius, corner)
-    stopped = now - way_round(way.x5, way.y5, along, radius, corner)
-    return leaves_half(moved, stopped, met, now - touch, rig)
+    past = way_round(along, radius, corner)
+    moved, stopped = come_along(way.x4, way.y4, past, corner), come_along(way.x5, way.y5, past, corner)
+    return leaves_half(moved, stopped, met, past.length - touch, rig)
 
 
 @jit_inline
-def way_round(qx: float, qy: float, along: float, beside: float, corner: Corner) -> float:
-    """Return how far it is from (qx, qy), body frame, round a corner to a place behind it [m]."""
-    x = qx * corner.c + qy * corner.s - corner.x
-    y = corner.side * (qx * corner.s - qy * corner.c) - corner.y
+def way_round(along: float, beside: float, corner: Corner) -> Round:
+    """Return the shortest way from here to (along, beside) behind a corner: tangent, arc, tangent, or straight."""
+    x, y = -corner.x, -corner.y
     far = along - corner.x, beside - corner.y
     d, e = math.sqrt(x * x + y * y), math.sqrt(far[0] * far[0] + far[1] * far[1])
-    begin, end = math.atan2(y, x), math.atan2(far[1], far[0])
-    if begin > 0.5 * math.pi:
-        begin -= 2.0 * math.pi
     near = min(corner.keeps, d, e)
-    if near < 1e-9:
-        return d + e
-    arc = end - begin - math.acos(min(1.0, near / d)) - math.acos(min(1.0, near / e))
-    if arc <= 0.0:
-        return math.sqrt((far[0] - x) ** 2 + (far[1] - y) ** 2)
-    return math.sqrt(d * d - near * near) + math.sqrt(e * e - near * near) + near * arc
+    if near > 1e-9:
+        begin, end = math.atan2(y, x), math.atan2(far[1], far[0])
+        if begin > 0.5 * math.pi:
+            begin -= 2.0 * math.pi
+        begin += math.acos(min(1.0, near / d))
+        arc = end - math.acos(min(1.0, near / e)) - begin
+        if arc > 0.0:
+            first, last = math.sqrt(d * d - near * near), math.sqrt(e * e - near * near)
+            return Round(first + near * arc + last, first, arc, near, math.cos(begin), math.sin(begin))
+    length = math.sqrt((far[0] - x) ** 2 + (far[1] - y) ** 2)
+    if length < 1e-9:
+        return Round(0.0, 0.0, 0.0, 0.0, 0.0, -1.0)
+    c, s = (far[1] - y) / length, (x - far[0]) / length  # its left: the way turns to the right of the corner's frame
+    return Round(length, x * s - y * c, 0.0, 0.0, c, s)
+
+
+@jit_inline
+def come_along(qx: float, qy: float, way: Round, corner: Corner) -> float:
+    """Return how far along a way round a corner its place nearest to (qx, qy), body frame, is [m]."""
+    x = qx * corner.c + qy * corner.s - corner.x
+    y = corner.side * (qx * corner.s - qy * corner.c) - corner.y
+    off, on = x * way.c + y * way.s, y * way.c - x * way.s
+    hidden = x > 0.0 and y > 0.0
+    if way.near == 0.0 or (on <= 0.0 and not hidden):
+        return way.first + on
+    turned = math.atan2(on, off)
+    if turned < 0.0:
+        turned += 2.0 * math.pi
+    if turned <= way.arc:
+        return way.first + way.near * turned
+    return way.first + way.near * way.arc + math.sqrt(x * x + y * y) * math.sin(turned - way.arc)
 
 
 @jit_inline

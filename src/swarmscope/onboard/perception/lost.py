@@ -191,11 +191,8 @@ def _lost_by(see: View, x: float, y: float) -> int:
         return -1
     if not least_range(rig) <= distance < WITHIN * rig.sensor.range_max:
         return -1
-    if rig.sensor.field > 0 and not in_view(x, y, see):
-        return -1
-    if was_near_track(percept, see.shared, x, y, rig):
-        return -1
-    return lost_by
+    gone = (rig.sensor.field > 0 and not in_view(x, y, see)) or was_near_track(percept, see.shared, x, y, rig)
+    return -1 if gone else lost_by
 
 
 @jit_inner
