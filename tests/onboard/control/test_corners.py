@@ -10,10 +10,12 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from helpers import one_robot, rig_of, scan_at, world_of
+from helpers import make_sensor, one_robot, rig_of, scan_at, world_of
 from swarmscope.onboard.body import Body
 from swarmscope.onboard.control.corners import Corner, apart_round, come_along, hidden_at, way_round
 from swarmscope.onboard.control.guard import guard
+from swarmscope.onboard.sensor import all_round
+from swarmscope.onboard.view import BROKEN
 from swarmscope.sim.world import Wall
 from swarmscope.storm.draw import Case
 from swarmscope.storm.play import watched
@@ -95,12 +97,45 @@ def test_bodies_that_touch_round_a_corner_are_a_chord_of_the_circle_that_both_ke
     assert apart_round(rig_of(clearance_m=0.0)) == pytest.approx(0.15 * math.pi)
 
 
+def hidden(ranges, n, side, rig=None, broken=()):
+    """How far along the line of sight past beam n a body is hidden."""
+    rows = one_robot(rig or rig_of())
+    rows.view.scan[:] = ranges
+    rows.view.unseen[list(broken)] = BROKEN
+    return hidden_at(rows.view, n, side, FAR)
+
+
 def test_behind_a_wall_across_a_body_is_hidden_as_soon_as_it_is_behind_the_wall():
     """A wall 1 m ahead that ends to the right of us: what touches the line of sight past its end stands behind it."""
     ranges = scan_at(world_of(Wall(points=[(1.0, 0.0), (1.0, 3.0)])), rig_of())
     n = edge_of(ranges, False)
-    along = hidden_at(ranges, n, -1, FAR, rig_of())
-    assert along == pytest.approx(0.99 + 0.15, abs=0.02)
+    assert hidden(ranges, n, -1) == pytest.approx(0.99 + 0.15, abs=0.02)
+
+
+def test_beams_that_say_nothing_do_not_show_a_body_behind_a_wall():
+    """The same wall, with holes: broken ones show nothing; where a beam in view meets nothing a body would show."""
+    ranges = scan_at(world_of(Wall(points=[(1.0, 0.0), (1.0, 3.0)])), rig_of())
+    n = edge_of(ranges, False)
+    whole = hidden(ranges, n, -1)
+    for holes in ([n + 3], [n + 2, n + 5, n + 9]):
+        with_holes = ranges.copy()
+        with_holes[holes] = np.inf
+        assert hidden(with_holes, n, -1, broken=holes) == whole
+        assert hidden(with_holes, n, -1) > 2.0
+
+
+def test_out_of_view_an_open_beam_shows_nothing():
+    sensor = all_round(make_sensor(beams=181, fov=math.pi))
+    rows = one_robot(rig_of(sensor=sensor))
+    rows.shared["view_first"], rows.shared["view_last"] = 89, 269
+    ranges = np.full(360, np.inf, np.float32)
+    ranges[265:290] = 0.5  # at the left edge of the view, the end of a wall, and what old scans show of it
+    rows.view.scan[:] = ranges
+    whole = hidden_at(rows.view, 265, -1, FAR)
+    rows.view.scan[[271, 275]] = np.inf
+    assert hidden_at(rows.view, 265, -1, FAR) == whole < 1.5
+    rows.view.scan[267] = np.inf
+    assert hidden_at(rows.view, 265, -1, FAR) > 2.0
 
 
 def test_behind_a_wall_along_a_body_is_hidden_beside_its_near_end():
@@ -108,14 +143,14 @@ def test_behind_a_wall_along_a_body_is_hidden_beside_its_near_end():
     ranges = scan_at(world_of(Wall(points=[(1.0, 0.3), (3.0, 0.9)])), rig_of())
     n = edge_of(ranges, False)
     assert ranges[n] == pytest.approx(math.hypot(1.0, 0.3), abs=0.05)
-    assert hidden_at(ranges, n, -1, FAR, rig_of()) > 3.0  # the wall is seen along: behind its near end there is no room
+    assert hidden(ranges, n, -1) > 3.0  # the wall is seen along: behind its near end there is no room
 
 
 def test_behind_a_post_that_is_narrower_a_body_shows():
     rig = rig_of()
     ranges = np.full(360, np.inf, np.float32)
     ranges[178:183] = 1.0  # 5 degrees wide
-    assert hidden_at(ranges, 182, 1, FAR, rig) > 0.15 / math.tan(math.radians(6.0) / 2) - 0.2
+    assert hidden(ranges, 182, 1, rig) > 0.15 / math.tan(math.radians(6.0) / 2) - 0.2
 
 
 def allowed(speed, rig):

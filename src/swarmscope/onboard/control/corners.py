@@ -16,7 +16,7 @@ from swarmscope.onboard.control.halves import leaves_half
 from swarmscope.onboard.control.way import Way
 from swarmscope.onboard.perception.beams import beam_at
 from swarmscope.onboard.rig import SIGMAS, Rig
-from swarmscope.onboard.view import View
+from swarmscope.onboard.view import BROKEN, View
 
 
 class Corner(NamedTuple):
@@ -118,7 +118,7 @@ def _clear_past(see: View, n: int, side: int, way: Way, met: float, enough: floa
     if not _opens(see.scan, n, side, rig):
         return True
     keeps, touch = _kept_off(rig), apart_round(rig)
-    along = hidden_at(see.scan, n, side, enough, rig)
+    along = hidden_at(see, n, side, enough)
     if along >= enough:
         return True
     m, near, turned = beam_at(n + side, rig.sensor), _nearer(rig) * see.scan[n], rig.sensor.increment
@@ -170,11 +170,13 @@ def come_along(qx: float, qy: float, way: Round, corner: Corner) -> float:
 
 
 @jit_inline
-def hidden_at(ranges: np.ndarray, n: int, side: int, enough: float, rig: Rig) -> float:
+def hidden_at(see: View, n: int, side: int, enough: float) -> float:
     """Return how far along the line of sight past an edge the centre of a body is that touches it and is hidden [m].
 
-    Beams that the body would cross have to end before it. Beyond ``enough`` [m] it does not matter.
+    Beams that the body would cross have to end before it, those at least that show where they end. Beyond ``enough``
+    [m] it does not matter.
     """
+    rig, ranges = see.rig, see.scan
     radius, increment = rig.body.radius_m, rig.sensor.increment
     nearer = _nearer(rig)
     along: float = nearer * ranges[n]
@@ -187,9 +189,19 @@ def hidden_at(ranges: np.ndarray, n: int, side: int, enough: float, rig: Rig) ->
         if off >= radius:
             break
         m = beam_at(n + side - side * k, rig.sensor)
-        along = max(along, _before(nearer * ranges[m] if m >= 0 else math.inf, c, s, radius))
+        if m >= 0 and _shows_its_end(see, m):
+            along = max(along, _before(nearer * ranges[m], c, s, radius))
         k += 1
     return along
+
+
+@jit_inline
+def _shows_its_end(see: View, m: int) -> bool:
+    """Tell whether beam m says how far one sees: not where it is broken, nor open out of view, where nobody looks."""
+    if see.unseen[m] & BROKEN:
+        return False
+    in_view = see.rig.sensor.field == 0 or see.shared["view_first"] <= m <= see.shared["view_last"]
+    return bool(in_view or see.scan[m] < see.rig.sensor.range_max)
 
 
 @jit_inline
