@@ -11,8 +11,7 @@ from swarmscope.storm.draw import Case
 from swarmscope.storm.play import watched
 
 FOUND = Path(__file__).parent / "found"
-STUCK = "what only a stuck beam looks at is not seen, and what others saw there is kept for a second"
-OPEN = {"stuck_beam_before_a_walls_end": STUCK}
+OPEN: dict[str, str] = {}
 """What still touches something, and why."""
 LONGER = 3.0
 """They ended with the contact; now they go on for as many times as long, at least a minute."""

@@ -124,8 +124,13 @@ def make_rig(
     safety: Safety = SAFETY,
     sharing: Sharing = SHARING,
 ) -> Rig:
-    """Return the constants of a robot with ``body`` and ``sensor``; raises ConfigError for an impossible body."""
+    """Return the constants of a robot with ``body`` and ``sensor``; raises ConfigError for an impossible body.
+
+    The longest range becomes the one that a scan can hold (float32): a beam that says it has seen nothing, not just a
+    little less.
+    """
     body = Body(*(float(v) for v in body))
+    sensor = sensor._replace(range_max=float(np.float32(sensor.range_max)))
     protection = protection_model(body)
     angles = sensor.angle_min + sensor.increment * np.arange(sensor.beams)
     beside = keeps_beside(body, sensor)

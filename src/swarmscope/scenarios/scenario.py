@@ -151,7 +151,8 @@ class GuardModel(_Strict):
     persistence_s: NotNegative = GUARDING.persistence_s
     """How long a neighbour that is out of sight is remembered [s]."""
     lost_s: NotNegative = GUARDING.lost_s
-    """How long a return is kept that is lost while no beam has passed its place [s]."""
+    """How long a return is kept that is lost while no beam has passed its place, three scans at least; 0: not at all
+    [s]."""
     blind_s: NotNegative = GUARDING.blind_s
     """A robot brakes when its LiDAR has said nothing for so long, where something was [s]."""
     thinnest_m: NotNegative = GUARDING.thinnest_m

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from helpers import DT, make_sensor, one_robot, rig_of, seen
+from swarmscope.onboard.body import Body
+from swarmscope.onboard.edge import Seen
 from swarmscope.onboard.perception.frames import look_back
 from swarmscope.onboard.perception.lost import MEMORY, WITHIN, keep_lost
 from swarmscope.onboard.perception.mend import mend
@@ -55,7 +57,7 @@ def test_a_scan_with_nothing_lost_stays_as_it_is():
     assert (rows.shared["losses"], rows.shared["blind_s"]) == (0.0, 0.0)
 
 
-@pytest.mark.parametrize(("lost_s", "ticks"), [(1.0, 5), (0.4, 2), (0.0, 0)])
+@pytest.mark.parametrize(("lost_s", "ticks"), [(1.0, 5), (0.8, 4), (0.4, 3), (0.0, 0)])
 def test_what_is_lost_is_kept_where_it_was_for_a_while(lost_s, ticks):
     rows = one_robot(rig_of(lost_s=lost_s))
     given(rows, scan_of(at_180=2.0))
@@ -102,6 +104,29 @@ def test_between_two_beams_the_one_that_does_not_see_it_keeps_it_unless_the_othe
     assert after(before, scan_of(at_179=4.0, at_180=4.0), turned) == {179: 4.0, 180: 4.0}
     assert after(before, scan_of(at_179=2.05), turned) == {179: 2.05}
     assert after(before, scan_of(at_179=1.0), turned) == {179: 1.0}
+
+
+@pytest.mark.parametrize("longest", [5.0, 10.2785, 1.81, 0.1 + 0.2, 19.99999])
+def test_a_beam_that_says_the_longest_range_has_seen_nothing(longest):
+    """As float32 10.2785 is a little less than itself: it has not looked through the place."""
+    rig = rig_of(sensor=make_sensor(range_max=longest))
+    near = 0.5 * longest
+    then = {int(n): pytest.approx(longest, abs=1e-5) for n in range(360) if n != AHEAD}
+    kept = after(scan_of(at_180=near), np.full(360, longest, np.float32), rows=one_robot(rig))
+    assert kept == then | {AHEAD: pytest.approx(near, abs=1e-5)}
+
+
+def test_what_a_neighbour_left_a_tick_ago_is_not_kept_however_slow_scans_are():
+    """Once a second others come 1 m: what stood there and was no neighbour's stays, what was his does not."""
+    for place, stays in ((0.75, True), (2.0, False)):
+        rows = one_robot(rig_of(body=Body(v_max_mps=1.0)))
+        for k, x in enumerate((2.0 + 0.15, 1.4)):
+            rows.set_time(float(k), 1.0)
+            rows.see([Seen(7, x, 0.0)])
+            dx, dy = update_odometry(rows.percept, rows.shared)
+            update_tracks(rows.percept, rows.shared, rows.rig, dx, dy)
+            scan = given(rows, scan_of(at_180=place) if k == 0 else scan_of())
+        assert returns(scan) == ({AHEAD: place} if stays else {})
 
 
 def test_the_end_of_a_wall_stays_nearer_than_the_hole_that_hides_it_is_bridged():

@@ -33,6 +33,8 @@ PASSED = 0.3
 """What was passed by so many times its distance is looked for in earnest, ..."""
 ROUGHLY = PASSED**5 / 5.0
 """... for the rest two terms of the arc tangent do, which err by less than this [rad]."""
+FEWEST_SCANS = 3.0
+"""It is kept for so many scans at least, however slowly they come: what one beam sees may be lost twice in a row."""
 DROPPED = np.float32(-1e9)
 SLIPS = 2
 MOST_TICKS = BROKEN - 1
@@ -51,7 +53,8 @@ def keep_lost(see: View, broken: int) -> None:
         seen += see.scan[n] < rig.sensor.range_max
     lost, found = 0, False
     if (broken > 0 or seen < rig.sensor.beams) and percept["dt_s"] > 0.0:
-        most = min(float(MOST_TICKS), rig.guarding.lost_s / percept["dt_s"])
+        scans = FEWEST_SCANS if rig.guarding.lost_s > 0.0 else 0.0
+        most = min(float(MOST_TICKS), max(scans, rig.guarding.lost_s / percept["dt_s"]))
         lost, found = _find_lost(see, int(most + 0.5))
     _note_losses(percept, see.shared, seen, lost)
     if broken > 0:

@@ -16,6 +16,7 @@ SKIN_M = 0.01
 """What lies no farther outside a neighbour's body is the body."""
 EXACT = (1.0, 0.7)
 """Gains where positioning does not err: what changes is the neighbour's speed."""
+SEEN_TWICE = 2
 STILL_RADIUS = 0.08
 """A neighbour that stays within this of one place stands still [m]."""
 
@@ -50,8 +51,9 @@ def update_tracks(percept: Row, shared: Row, rig: Rig, dx: float, dy: float) -> 
         if now - shared["track_seen_s"][t] > rig.guarding.persistence_s:
             shared["track_id"][t] = -1
             continue
-        shared["track_x"][t] += shared["track_vx"][t] * dt - dx
-        shared["track_y"][t] += shared["track_vy"][t] * dt - dy
+        shared["track_was_x"][t], shared["track_was_y"][t] = shared["track_x"][t] - dx, shared["track_y"][t] - dy
+        shared["track_x"][t] = shared["track_was_x"][t] + shared["track_vx"][t] * dt
+        shared["track_y"][t] = shared["track_was_y"][t] + shared["track_vy"][t] * dt
     c, s = math.cos(percept["compass"]), math.sin(percept["compass"])
     for k in range(percept["n_neighbours"]):
         x = c * percept["neighbour_x"][k] - s * percept["neighbour_y"][k]
@@ -63,6 +65,7 @@ def update_tracks(percept: Row, shared: Row, rig: Rig, dx: float, dy: float) -> 
                 continue
             shared["track_id"][t] = percept["neighbour_id"][k]
             shared["track_x"][t], shared["track_y"][t] = x, y
+            shared["track_was_x"][t], shared["track_was_y"][t] = x, y
             shared["track_vx"][t], shared["track_vy"][t] = 0.0, 0.0
             shared["track_anchor_x"][t] = shared["x"] + x
             shared["track_anchor_y"][t] = shared["y"] + y
@@ -222,34 +225,49 @@ def near_track(percept: Row, shared: Row, px: float, py: float, rig: Rig) -> boo
         reach = neighbour_reach(math.sqrt(x * x + y * y), rig)
         if (px - x) ** 2 + (py - y) ** 2 <= reach * reach:
             return True
-    return _near_track(percept, shared, px, py, rig, 0.0)
+    gx, gy = _by_compass(percept, px, py)
+    for t in range(PEERS):
+        x, y = shared["track_x"][t], shared["track_y"][t]
+        reach = neighbour_reach(math.sqrt(x * x + y * y), rig)
+        if shared["track_id"][t] >= 0 and (gx - x) ** 2 + (gy - y) ** 2 <= reach * reach:
+            return True
+    return False
 
 
 @jit
 def on_track(percept: Row, shared: Row, px: float, py: float, rig: Rig) -> bool:
     """Tell whether the return at (px, py), body frame, lies where a neighbour's body is, errors left aside."""
-    return _near_track(percept, shared, px, py, rig, -1.0)
+    gx, gy = _by_compass(percept, px, py)
+    reach = rig.body.radius_m + SKIN_M
+    for t in range(PEERS):
+        x, y = shared["track_x"][t], shared["track_y"][t]
+        if shared["track_id"][t] >= 0 and (gx - x) ** 2 + (gy - y) ** 2 <= reach * reach:
+            return True
+    return False
 
 
 @jit_inline
 def was_near_track(percept: Row, shared: Row, px: float, py: float, rig: Rig) -> bool:
-    """Tell whether what was at (px, py), body frame of now, a tick ago may have belonged to a neighbour."""
+    """Tell whether what was at (px, py), body frame of now, a tick ago may have belonged to a neighbour.
+
+    Where it was then is known of one that was seen then and is now; others may have come as far as they can.
+    """
+    gx, gy = _by_compass(percept, px, py)
     way = max(rig.guarding.others_mps, rig.body.v_max_mps) * percept["dt_s"]
-    return _near_track(percept, shared, px, py, rig, way)
-
-
-@jit_inner
-def _near_track(percept: Row, shared: Row, px: float, py: float, rig: Rig, more: float) -> bool:
-    """Tell whether (px, py) lies within reach of a neighbour and ``more`` [m]; below 0: where its body is."""
-    c, s = math.cos(percept["compass"]), math.sin(percept["compass"])
-    gx, gy = c * px - s * py, s * px + c * py
     for t in range(PEERS):
         if shared["track_id"][t] < 0:
             continue
-        x, y = shared["track_x"][t], shared["track_y"][t]
-        reach = rig.body.radius_m + SKIN_M
-        if more >= 0.0:
-            reach = neighbour_reach(math.sqrt(x * x + y * y), rig) + more
+        x, y = shared["track_was_x"][t], shared["track_was_y"][t]
+        reach = neighbour_reach(math.sqrt(x * x + y * y), rig)
+        if shared["track_n"][t] < SEEN_TWICE or shared["track_seen_s"][t] < percept["now_s"]:
+            reach += way
         if (gx - x) ** 2 + (gy - y) ** 2 <= reach * reach:
             return True
     return False
+
+
+@jit_inline
+def _by_compass(percept: Row, px: float, py: float) -> tuple[float, float]:
+    """Return (px, py) of the body frame in the compass frame [m]."""
+    c, s = math.cos(percept["compass"]), math.sin(percept["compass"])
+    return c * px - s * py, s * px + c * py
