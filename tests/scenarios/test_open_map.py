@@ -7,11 +7,11 @@ import pytest
 
 from helpers import beams_of, rig_of, run_scenario
 from swarmscope.judging.shortest_path import any_angle_paths, grid_paths
-from swarmscope.scenarios.places import make_setup, map_world
+from swarmscope.scenarios.places import make_setup, world_of
 from swarmscope.scenarios.read import parse_scenario
 from swarmscope.sim.contact import static_clearance
 from swarmscope.sim.lidar import cast_static
-from swarmscope.sim.maps import save_map
+from swarmscope.sim.maps import load_map, save_map
 from swarmscope.sim.world import compile_world, grid_from_solid
 from swarmscope.tasks import UnsolvableWorldError
 
@@ -33,7 +33,7 @@ def scenario(path, robots, **more):
 
 
 def test_sensing_and_contact_end_at_the_edge(open_map):
-    spec = map_world(open_map)
+    spec = world_of(load_map(open_map))
     assert spec.bounds == pytest.approx(SIDE)
     world, rig = compile_world(spec), rig_of()
     out = np.full(rig.sensor.beams, np.inf, np.float32)

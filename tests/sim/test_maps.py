@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 
 import numpy as np
 import pytest
@@ -12,8 +13,10 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from swarmscope.errors import ConfigError, InputFileError, UnknownNameError
-from swarmscope.sim.maps import closed, load_map, load_movingai, packaged_map, save_map
-from swarmscope.sim.world import Grid, grid_from_solid, solid_from_grid
+from swarmscope.sim.contact import static_clearance
+from swarmscope.sim.maps import Trip, closed, load_map, load_movingai, load_trips, packaged_map, save_map
+from swarmscope.sim.maps.movingai import place_of
+from swarmscope.sim.world import Grid, WorldSpec, compile_world, grid_corners, grid_from_solid, solid_from_grid
 
 SETTINGS = {
     "image": "map.pgm",
@@ -66,8 +69,14 @@ def test_a_map_that_is_free_at_its_edge_is_closed_beyond_it(free):
         (100, {}, True),  # between the thresholds: unknown
         (0, {"negate": 1}, False),
         (255, {"negate": True}, True),
-        (51, {"free_thresh": 0.8, "occupied_thresh": 0.8}, True),  # p = 0.8: occupied comes first
-        (255, {"free_thresh": 0, "occupied_thresh": 1}, False),
+        (255, {"free_thresh": 0, "occupied_thresh": 1}, True),  # nothing is below 0
+        (255, {"free_thresh": 0.001, "occupied_thresh": 1}, False),
+        (205, {"free_thresh": 0.25, "mode": "scale"}, False),
+        (150, {"free_thresh": 0.25, "mode": "scale"}, True),  # 0.41: neither free nor occupied
+        (0, {"mode": "raw"}, False),  # the value itself: 0 is free,
+        (1, {"mode": "raw"}, True),  # 1 to 100 more or less occupied,
+        (255, {"mode": "raw"}, True),  # 255 unknown
+        (0, {"mode": "raw", "negate": 1}, False),
         (254, {"free_thresh": 0.0}, True),
     ],
 )
@@ -83,10 +92,128 @@ def test_text_pgm_comments_png_and_other_depths_are_read(tmp_path):
     assert load_map(write_map(tmp_path, b"P5\n2 2\n65535\n" + b"\x00\x00" + 3 * b"\xfe\xfe")) == expected
     assert load_map(write_map(tmp_path, b"P5\n2 2\n15\n\x00\x0f\x0f\x0f")) == expected
     cells = np.array([[0, 254], [254, 254]], dtype=np.uint8)
-    for mode in ("L", "RGB", "RGBA", "P", "LA", "1"):
+    for mode in ("L", "RGB", "P", "1"):
         Image.fromarray(cells).convert(mode).save(tmp_path / "map.png")
         image = (tmp_path / "map.png").read_bytes()
         assert load_map(write_map(tmp_path, image, "map.png", image="map.png")) == expected, mode
+
+
+@pytest.mark.parametrize(
+    ("pixel", "mode", "free"),
+    [
+        ((254, 254, 254, 255), "trinary", True),
+        ((254, 254, 254, 0), "trinary", False),  # 0.75 bright: 0.25 occupied
+        ((254, 254, 254, 200), "trinary", True),  # 0.054
+        ((254, 254, 254, 254), "scale", False),  # not opaque: unknown
+        ((254, 254, 254, 255), "scale", True),
+        ((0, 0, 0, 0), "raw", True),
+        ((255, 255, 0, 255), "trinary", False),  # 0.25
+    ],
+)
+def test_transparency_is_read_as_map_server_does(tmp_path, pixel, mode, free):
+    Image.new("RGBA", (1, 1), pixel).save(tmp_path / "map.png")
+    path = write_map(tmp_path, (tmp_path / "map.png").read_bytes(), "map.png", image="map.png", mode=mode)
+    assert (not load_map(path).rows) is free
+
+
+def nav2_cell(pixel, full, mode, settings):
+    """A cell as nav2's map_io calls it, pixel by pixel: 0 free, 100 occupied, -1 unknown, between for ``scale``."""
+    colours, alpha = (pixel[:3], pixel[3]) if len(pixel) == 4 else (pixel, None)
+    channels = [value / full for value in (pixel if alpha is not None and mode == "trinary" else colours)]
+    shade = sum(channels) / len(channels)
+    if mode == "raw":
+        return round(shade * 255) if round(shade * 255) <= 100 else -1
+    occupancy = shade if settings["negate"] else 1.0 - shade
+    if mode == "scale" and alpha is not None and alpha < full:
+        return -1
+    if occupancy > settings["occupied_thresh"]:
+        return 100
+    if occupancy < settings["free_thresh"]:
+        return 0
+    return -1 if mode == "trinary" else 50
+
+
+@pytest.mark.parametrize("mode", ["trinary", "scale", "raw"])
+@pytest.mark.parametrize("kind", ["L", "RGB", "RGBA", "LA", "I;16"])
+@pytest.mark.parametrize("seed", range(4))
+def test_every_cell_is_read_as_nav2_reads_it(tmp_path, mode, kind, seed):
+    rng = np.random.default_rng([seed, len(kind)])
+    full, channels = (65535, 1) if kind == "I;16" else (255, len(kind))
+    values = rng.choice([0, 1, 50, 51, 101, 127, 205, 250, 254, 255], (9, 11, channels)) * (full // 255)
+    if kind in ("RGBA", "LA"):
+        values[..., -1] = np.where(rng.random((9, 11)) < 0.5, full, values[..., -1])
+    shown = values.astype(np.uint16 if full > 255 else np.uint8)
+    Image.fromarray(shown[..., 0] if channels == 1 else shown).save(tmp_path / "map.png")
+    settings = {"negate": int(rng.integers(2)), "free_thresh": rng.choice([0.1, 0.196, 0.25]), "occupied_thresh": 0.65}
+    settings = {name: float(value) if name != "negate" else value for name, value in settings.items()}
+    image = (tmp_path / "map.png").read_bytes()
+    grid = load_map(write_map(tmp_path, image, "map.png", image="map.png", mode=mode, **settings))
+    if kind == "LA":
+        values = values[..., [0, 0, 0, 1]]
+    elif channels == 1 and full == 255:
+        values = values[..., [0, 0, 0]]
+    expected = [[nav2_cell(pixel.tolist(), full, mode, settings) == 0 for pixel in row] for row in values]
+    assert np.array_equal(solid_from_grid(grid)[::-1] == 0, expected)
+
+
+def test_the_picture_may_lie_anywhere(tmp_path, monkeypatch):
+    expected = load_map(write_map(tmp_path))
+    home, other = tmp_path / "home", tmp_path / "other"
+    for folder in (home, other):
+        folder.mkdir()
+        (folder / "it.pgm").write_bytes((tmp_path / "map.pgm").read_bytes())
+    monkeypatch.setenv("HOME", str(home))
+    for name in ("~/it.pgm", str(other / "it.pgm"), "other/it.pgm"):
+        assert load_map(_point_to(tmp_path, name)) == expected
+    with pytest.raises(InputFileError, match=r"home/gone\.pgm: there is no such picture"):
+        load_map(_point_to(tmp_path, "~/gone.pgm"))
+
+
+def test_a_rotated_origin_turns_the_grid(tmp_path):
+    """Three cells wide, two high, 0.5 m; turned by a quarter the columns count upwards from (1, -2)."""
+    grid = load_map(write_map(tmp_path, b"P5\n3 2\n255\n\xfe\xfe\xfe\xfe\x00\xfe", origin=[1.0, -2.0, math.pi / 2]))
+    assert (grid.origin, grid.yaw) == ((1.0, -2.0), pytest.approx(math.pi / 2))
+    assert grid_corners(grid) == pytest.approx(np.array([[1.0, -2.0], [1.0, -0.5], [0.0, -0.5], [0.0, -2.0]]))
+    world = compile_world(WorldSpec(obstacles=[grid], bounds=(0.0, -2.0, 1.0, -0.5)))
+    assert static_clearance(world, 0.75, -1.25, 0.75, -1.25, 1.0) == 0.0  # the middle of column 1, row 0
+    assert static_clearance(world, 0.3, -1.25, 0.3, -1.25, 1.0) == pytest.approx(0.2)
+    save_map(grid, tmp_path / "again.yaml")
+    assert load_map(tmp_path / "again.yaml") == grid
+
+
+def test_a_picture_alone_needs_the_size_of_its_cells(tmp_path):
+    write_map(tmp_path)
+    grid = load_map(tmp_path / "map.pgm", 0.25)
+    assert (grid.resolution, grid.origin, grid.rows) == (0.25, (0.0, 0.0), [(1, 0, 0)])
+    with pytest.raises(ConfigError, match="how large its cells are"):
+        load_map(tmp_path / "map.pgm")
+
+
+def test_maps_that_are_too_large_are_refused_before_they_are_read(tmp_path, monkeypatch):
+    monkeypatch.setattr("swarmscope.sim.maps.files.MOST_CELLS", 12)
+    assert load_map(write_map(tmp_path, b"P5\n4 3\n255\n" + 12 * b"\xfe")).width == 4
+    with pytest.raises(ConfigError, match="5 x 3 cells, at most 12"):
+        load_map(write_map(tmp_path, b"P5\n5 3\n255\n"))
+    monkeypatch.setattr("swarmscope.sim.maps.files.MOST_RUNS", 3)
+    with pytest.raises(ConfigError, match="6 solid pieces of rows, at most 3"):
+        load_map(write_map(tmp_path, b"P5\n4 3\n255\n" + 6 * b"\x00\xfe"))
+
+
+def test_trips_of_the_moving_ai_benchmarks(tmp_path):
+    file = tmp_path / "a.scen"
+    file.write_text("version 1\n0\ta b.map\t8\t4\t1\t0\t6\t3\t7.5\n\n1 a.map 8 4 0 3 7 0 9\n")
+    trips = load_trips(file)
+    assert trips == [Trip((1, 0), (6, 3)), Trip((0, 3), (7, 0))]
+    grid = Grid(resolution=0.5, origin=(0.0, 0.0), width=8, height=4, rows=[])
+    assert place_of(trips[0].start, grid) == (0.75, 1.75)
+    assert place_of(trips[0].goal, grid) == (3.25, 0.25)
+    with pytest.raises(ConfigError, match=r"\(8, 0\) is not on the map of 8 x 4"):
+        place_of((8, 0), grid)
+    for text in ("", "1 a.map", "version 1\n0 a.map 8 4 1 0 6\n", "version 1\n0 a.map 8 4 -1 0 6 3 7.5\n"):
+        file.write_text(text)
+        if text != "":
+            with pytest.raises(InputFileError, match=r"a\.scen"):
+                load_trips(file)
 
 
 def test_unknown_keys_and_exponents_are_accepted(tmp_path):
@@ -106,7 +233,6 @@ def test_unknown_keys_and_exponents_are_accepted(tmp_path):
         ({"resolution": float("nan")}, "resolution: must be a finite number"),
         ({"resolution": 1e30}, "resolution"),
         ({"resolution": [1]}, "resolution"),
-        ({"origin": [0, 0, 0.1]}, "rotated"),
         ({"origin": [0, 0]}, "origin: must be"),
         ({"origin": 3}, "origin: must be"),
         ({"origin": ["a", 0, 0]}, r"origin\[0\]"),
@@ -115,8 +241,9 @@ def test_unknown_keys_and_exponents_are_accepted(tmp_path):
         ({"negate": "no way"}, "negate"),
         ({"occupied_thresh": 1.5}, "occupied_thresh: must lie between 0 and 1"),
         ({"free_thresh": 0.9}, "free_thresh: 0.9 is above"),
-        ({"mode": "scale"}, "only 'trinary'"),
-        ({"mode": 7}, "only 'trinary'"),
+        ({"mode": "trianry"}, "mode: must be one of trinary, scale, raw"),
+        ({"mode": 7}, "mode: must be one of"),
+        ({"image": "~nobody_of_this_name/map.pgm"}, "image: '~nobody"),
         ({"image": 5}, "image: must be a file name"),
     ],
 )

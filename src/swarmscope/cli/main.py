@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -78,6 +78,8 @@ def common(
     "[bold]swarmscope run --task T3 --seed 4 --set planner.params.w_i=0[/bold]\n\n"
     "[bold]swarmscope run examples/noisy_radio.yaml[/bold]\n\n"
     "[bold]swarmscope run --map willow_garage_office --robots 5 --seed 23[/bold]\n\n"
+    "[bold]swarmscope run --map hall.yaml --start 1,2,90 --goal 8,2 --start 8,3 --goal 1,3[/bold]\n\n"
+    "[bold]swarmscope run --map drawn.png --resolution 0.05 --robots 3[/bold]\n\n"
     "[bold]swarmscope run runs/first/config.yaml --out runs/again[/bold]"
 )
 def run(
@@ -86,12 +88,30 @@ def run(
     ] = None,
     task: Annotated[str | None, typer.Option(help="Task (see 'swarmscope tasks') or FILE.py, else T1.")] = None,
     map_: Annotated[
-        str | None, typer.Option("--map", help="map_server YAML of a building, or a packaged map by name.")
+        str | None,
+        typer.Option(
+            "--map", help="A building: map_server YAML, picture, Moving AI .map, or the name of a packaged map."
+        ),
     ] = None,
+    resolution: Annotated[
+        float | None, typer.Option(help="Side of the map's cells [m], where its file does not say it.")
+    ] = None,
+    number: Annotated[int | None, typer.Option(min=0, help="Which maze of a .npz of ORION's.")] = None,
+    start: Annotated[
+        list[str] | None,
+        typer.Option(metavar="X,Y[,DEG]", help="Start of the next robot on the map [m, m, degrees]; repeatable."),
+    ] = None,
+    goal: Annotated[
+        list[str] | None, typer.Option(metavar="X,Y", help="Goal of the next robot on the map [m]; repeatable.")
+    ] = None,
+    trips: Annotated[str | None, typer.Option(help="Moving AI .scen file: starts and goals on the map.")] = None,
+    first_trip: Annotated[int | None, typer.Option(min=0, help="Trip of robot 0, else the file's first, 0.")] = None,
     planner: Annotated[
         str | None, typer.Option(help="Planner (see 'swarmscope planners') or FILE.py, else nav-scope.")
     ] = None,
-    robots: Annotated[int | None, typer.Option(help="Number of robots, else 15.")] = None,
+    robots: Annotated[
+        int | None, typer.Option(help="Number of robots, else as many as have starts or goals on the map, else 15.")
+    ] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of world and noise, else 0.")] = None,
     limit: Annotated[float | None, typer.Option(help="Time limit, simulated seconds, else 300.")] = None,
     set_: Annotated[
@@ -106,7 +126,10 @@ def run(
     """Run one scenario to a folder: metrics, trajectory, world, a picture, a replay page."""
     from swarmscope.cli.run import run_command
 
-    options = {"robots": robots, "seed": seed, "limit_s": limit}
+    options: dict[str, Any] = {"robots": robots, "seed": seed, "limit_s": limit}
+    options |= {"map.resolution_m": resolution, "map.trips": trips, "map.first_trip": first_trip}
+    options |= {"map.number": number}
+    options |= {"map.starts": start, "map.goals": goal}
     run_command(scenario, task, map_, planner, options, set_ or [], out, threads, pictures, not no_code)
 
 

@@ -17,13 +17,17 @@ from swarmscope.errors import ConfigError
 from swarmscope.experiments.warm_up import kernels_are_cold
 from swarmscope.judging.run import place_name, run_scenario
 from swarmscope.judging.run_folder import check_out
-from swarmscope.scenarios.overrides import PLACES, choose, set_key
+from swarmscope.scenarios.overrides import PLACES, choose, set_key, set_path
 from swarmscope.scenarios.read import parse_scenario, read_scenario_file
 from swarmscope.scenarios.scenario import Scenario
 from swarmscope.user_files import short_name
 from swarmscope.viewing.progress import progress_bar
 
 MOST_FAILURES = 10
+OPTIONS = {"starts": "start", "goals": "goal", "resolution_m": "resolution", "first_trip": "first-trip"}
+"""Options that are not called as their keys."""
+PLACED = {"starts": 3, "goals": 2}
+"""Options that are places, and how many numbers each has at most."""
 ROWS = (
     ("arrival_rate", "arrived", "{:.1%}"),
     ("collisions", "collisions", "{:.0f}"),
@@ -75,6 +79,28 @@ def run_command(
         print(place / name)
 
 
+def _set_option(values: dict[str, Any], key: str, value: Any) -> None:
+    """Set an option; starts and goals are text with degrees."""
+    group, dot, name = key.rpartition(".")
+    option = f"--{OPTIONS.get(name, name)}"
+    if dot and not isinstance(values.get(group), dict):
+        raise ConfigError(option, "needs --map, or a scenario with a map")
+    if name in PLACED:
+        value = [_read_place(text, option, PLACED[name]) for text in value]
+    set_path(values, key.split("."), value, option)
+
+
+def _read_place(text: str, option: str, most: int) -> list[float]:
+    """Return x, y [m] and what may follow, degrees in radians."""
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        numbers = []
+    if not 2 <= len(numbers) <= most or not np.isfinite(numbers).all():
+        raise ConfigError(f"{option} {text}", "must look like X,Y" + (" or X,Y,DEG" if most > 2 else ""))
+    return [*numbers[:2], *np.radians(numbers[2:]).tolist()]
+
+
 def print_metrics(console: Console, metrics: dict[str, Any]) -> None:
     """Print the key figures as a table."""
     about = metrics["run"]
@@ -115,7 +141,9 @@ def read_options(
         choose(values, "map", "file", map_)
     if planner is not None:
         choose(values, "planner", "name", planner)
-    values |= {key: value for key, value in options.items() if value is not None}
+    for key, value in options.items():
+        if value is not None:
+            _set_option(values, key, value)
     named = {change.replace("=", ".").partition(".")[0] for change in changes}
     if not any(key in values for key in PLACES) and not named & {"map", "place"}:
         values["task"] = {"name": "T1"}

@@ -8,13 +8,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from swarmscope.errors import ConfigError
-from swarmscope.sim.maps import closed, load_map, packaged_map
-from swarmscope.sim.world import WorldSpec
-from swarmscope.tasks import Setup, check_setup, place_on_map, setup_of_task
+from swarmscope.sim.maps import Trip, closed, load_map, load_movingai, load_trips, packaged_map
+from swarmscope.sim.maps.movingai import place_of
+from swarmscope.sim.maps.orion import load_maze
+from swarmscope.sim.world import Grid, WorldSpec, grid_corners
+from swarmscope.tasks import Setup, Wanted, check_setup, place_wanted, setup_of_task
 from swarmscope.tasks._check import Keeping, check_keeping
 
 if TYPE_CHECKING:  # what a scenario says elsewhere changes no place
-    from swarmscope.scenarios.scenario import Scenario
+    from swarmscope.scenarios.scenario import MapModel, Scenario
+
+YAML = (".yaml", ".yml")
 
 
 def make_setup(scenario: Scenario) -> Setup:
@@ -45,23 +49,66 @@ def _made(scenario: Scenario) -> Setup:
         return setup_of_task(task.name, task.options, scenario.seed, scenario.robots, radius)
     if scenario.map is None:
         raise ConfigError("task", "is missing")
-    spec = map_world(map_path(scenario.map.file))
-    return place_on_map(spec, scenario.seed, scenario.robots, radius, scenario.map.min_distance_m)
+    return _on_map(scenario, scenario.map)
 
 
-def map_world(path: Path) -> WorldSpec:
-    """Return the world of a map_server map; its bounds are the picture's, and solid."""
-    grid = load_map(path)
-    x, y = grid.origin
-    bounds = (x, y, x + grid.width * grid.resolution, y + grid.height * grid.resolution)
-    return WorldSpec(obstacles=[closed(grid)], bounds=bounds)
+def _on_map(scenario: Scenario, place: MapModel) -> Setup:
+    """Return the setup of robots on a map: starts and goals as given, the others drawn."""
+    grid, trips = _read_map(place)
+    starts, goals = list(place.starts), list(place.goals)
+    if place.trips is not None:
+        if starts or goals:
+            raise ConfigError("map.trips", "give either trips, or starts and goals")
+        trips = load_trips(Path(place.trips))
+    if trips and not starts and not goals:
+        trips = _some_trips(trips, place.first_trip, scenario.robots)
+        starts = [place_of(trip.start, grid) for trip in trips]
+        goals = [place_of(trip.goal, grid) for trip in trips]
+    for key, given in (("starts", starts), ("goals", goals)):
+        if len(given) > scenario.robots:
+            raise ConfigError(f"map.{key}", f"{len(given)} are given for {scenario.robots} robots: raise 'robots'")
+    wanted = Wanted(scenario.seed, scenario.robots, scenario.robot.radius_m, place.min_distance_m, starts, goals)
+    return place_wanted(world_of(grid), wanted)
+
+
+def _some_trips(trips: list[Trip], first: int, robots: int) -> list[Trip]:
+    if first + robots > len(trips):
+        remedy = "ask for fewer 'robots'" if first == 0 else "ask for fewer 'robots', or begin earlier"
+        raise ConfigError("map.first_trip", f"there are {len(trips)} trips, not {first} and {robots} more: {remedy}")
+    return trips[first : first + robots]
+
+
+def _read_map(place: MapModel) -> tuple[Grid, list[Trip]]:
+    """Return the cells of a scenario's map, and the trips that its file holds."""
+    path = map_path(place.file)
+    kind, side = path.suffix.lower(), place.resolution_m
+    if kind in YAML and side is not None:
+        raise ConfigError("map.resolution_m", f"{path} says it itself")
+    if kind not in YAML and side is None:
+        raise ConfigError("map.resolution_m", f"{path} does not say how large its cells are: give it [m]")
+    if kind == ".npz" and side is not None:
+        if place.number is None:
+            raise ConfigError("map.number", f"{path} holds many mazes: say which one, or --number")
+        return load_maze(path, place.number, side)
+    if place.number is not None:
+        raise ConfigError("map.number", f"{path} holds one map only")
+    if kind == ".map" and side is not None:
+        return load_movingai(path, side), []
+    return load_map(path, side), []
+
+
+def world_of(grid: Grid) -> WorldSpec:
+    """Return the world of a map; its bounds are the box round the picture, and it is solid beyond."""
+    corners = grid_corners(grid)
+    (x0, y0), (x1, y1) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
+    return WorldSpec(obstacles=[closed(grid)], bounds=(x0, y0, x1, y1))
 
 
 def map_path(name: str) -> Path:
-    """Return the YAML file of a map: a path, or the name of a map that comes with the package."""
-    return packaged_map(name) if is_packaged(name) else Path(name)
+    """Return the file of a map: a path, or that of a map that comes with the package."""
+    return packaged_map(name) if is_packaged(name) else Path(name).expanduser()
 
 
 def is_packaged(name: str) -> bool:
     """Tell whether this is the name of a map that comes with the package, not a path."""
-    return not name.endswith((".yaml", ".yml"))
+    return "/" not in name and not Path(name).suffix

@@ -15,6 +15,9 @@ from swarmscope.scenarios.scenario import Scenario
 from swarmscope.tasks import task_names
 from swarmscope.user_files import is_file_name, read_code
 
+REMEDIES = {"place.world.map": ": a map from a file is 'map: {file, starts, goals}' instead of 'place'"}
+"""What to do about keys that people expect."""
+
 
 def parse_scenario(values: Any, where: str) -> Scenario:
     """Return the scenario in ``values``; a ConfigError names place, problem and the nearest valid key."""
@@ -62,6 +65,8 @@ def read_scenario_file(path: Path) -> dict[str, Any]:
     place = values.get("map")
     if isinstance(place, dict) and isinstance(place.get("file"), str):
         place["file"] = _find_map(path, place["file"])
+    if isinstance(place, dict) and isinstance(place.get("trips"), str):
+        place["trips"] = _find_beside(path, place["trips"])
     planner = values.get("planner")
     if isinstance(planner, dict) and isinstance(planner.get("model"), str):
         planner["model"] = _find_beside(path, planner["model"])
@@ -107,6 +112,7 @@ def _first_problem(error: ValidationError, where: str) -> ConfigError:
     message = str(problem["msg"]).removeprefix("Value error, ")
     if problem["type"] == "extra_forbidden":
         message = f"unknown key{nearest_hint(str(problem['loc'][-1]), _valid_keys(problem['loc'][:-1]))}"
+        message += REMEDIES.get(place, "")
     return ConfigError(f"{where}: {place}", message)
 
 

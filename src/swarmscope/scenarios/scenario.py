@@ -8,7 +8,7 @@ The text after a field is its meaning, with the unit in brackets; docs/scenario.
 from __future__ import annotations
 
 import math
-from typing import Annotated, Final, Literal, Self
+from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
@@ -17,7 +17,7 @@ from swarmscope.onboard.lidar import Lidar
 from swarmscope.onboard.rig import Guarding, Safety, Sharing
 from swarmscope.sim.loop import Setting
 from swarmscope.sim.state import Faults, Noise, Radio
-from swarmscope.sim.world import WorldSpec
+from swarmscope.sim.world import LONGEST_M, WorldSpec
 
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
@@ -190,13 +190,34 @@ class TaskModel(_Strict):
     """Options of the task by name; those not given have their defaults."""
 
 
+Metres = Annotated[float, Field(ge=-LONGEST_M, le=LONGEST_M)]
+Heading = Annotated[float, Field(ge=-1000.0, le=1000.0)]
+MapStart = tuple[Metres, Metres] | tuple[Metres, Metres, Heading] | None
+MapGoal = tuple[Metres, Metres] | None
+
+
 class MapModel(_Strict):
-    """A map_server map, solid beyond its picture; starts and goals are drawn from its free space."""
+    """A map, solid beyond its picture; starts and goals that are not given are drawn from its free space."""
 
     file: str
-    """The map's YAML file (looked for beside the scenario, too), or the name of a packaged map."""
-    min_distance_m: NotNegative = 8.0
-    """From a start to its goal, at least [m]."""
+    """The map (looked for beside the scenario, too): map_server's YAML, a picture alone, a Moving AI .map, a .npz of
+    ORION's mazes, or the name of a packaged map."""
+    resolution_m: Positive | None = None
+    """Side of a cell, for files that do not say it: all but map_server's YAML [m]."""
+    number: Annotated[int, Field(ge=0)] | None = None
+    """Which of ORION's mazes; its starts and goals are the robots' unless others are given."""
+    starts: list[MapStart] = []
+    """Where robots start, in the map's coordinates: x, y or x, y, yaw [m, m, rad]; without yaw they look at their goal.
+    What is null, or missing at the end, is drawn."""
+    goals: list[MapGoal] = []
+    """Where robots want to go: x, y [m], in the same way."""
+    trips: str | None = None
+    """A Moving AI .scen file (looked for beside the scenario, too): starts and goals of its trips."""
+    first_trip: Annotated[int, Field(ge=0)] = 0
+    """Number of robot 0's trip, 0 is the first; the others have the next ones."""
+    min_distance_m: NotNegative | None = None
+    """From a start to its goal, where one of them is drawn, at least; null is 8 m, in maps whose free space is shorter
+    than 20 m two fifths of that [m]."""
 
 
 class WorldModel(_Strict):
@@ -258,6 +279,17 @@ class Scenario(_Strict):
     """Keep scans for the replay page; ``auto`` leaves them out where they would be huge."""
     judge_sides: bool = False
     """Note the side of the shortest way beside every choice of a side; planners with ``told`` set take it."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _count_robots(cls, values: Any) -> Any:
+        """As many robots as have a start or a goal on the map, if nobody says how many."""
+        place = values.get("map") if isinstance(values, dict) else None
+        if not isinstance(place, dict) or "robots" in values:
+            return values
+        listed = [place[key] for key in ("starts", "goals") if isinstance(place.get(key), list)]
+        count = max(map(len, listed), default=0)
+        return values | {"robots": count} if count > 0 else values
 
     @model_validator(mode="after")
     def _one_place(self) -> Self:

@@ -14,7 +14,7 @@ from swarmscope.onboard.data_sheets import check_horizon
 from swarmscope.onboard.planners import Planner, load_planner
 from swarmscope.onboard.rig import Guarding, Rig, Safety, Sharing, make_rig
 from swarmscope.onboard.sensor import Sensor, all_round
-from swarmscope.scenarios.places import is_packaged
+from swarmscope.scenarios.places import is_packaged, map_path
 from swarmscope.scenarios.scenario import NoiseModel, PlannerModel, Scenario
 from swarmscope.sim.lidar import make_beams
 from swarmscope.sim.loop import Setting
@@ -42,7 +42,9 @@ def complete(scenario: Scenario, run_files: bool = True) -> dict[str, Any]:
     if planner.model is not None:
         values["planner"]["model"] = str(Path(planner.model).resolve())
     if scenario.map is not None and not is_packaged(scenario.map.file):
-        values["map"]["file"] = str(Path(scenario.map.file).resolve())
+        values["map"]["file"] = str(map_path(scenario.map.file).resolve())
+    if scenario.map is not None and scenario.map.trips is not None:
+        values["map"]["trips"] = str(Path(scenario.map.trips).resolve())
     return values
 
 

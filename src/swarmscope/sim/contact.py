@@ -6,7 +6,7 @@ import math
 
 from swarmscope._jit import jit_inline
 from swarmscope.geometry import point_segment_distance, segments_distance
-from swarmscope.sim.world import PIECE_M, World, bin_index
+from swarmscope.sim.world import PIECE_M, World, bin_index, in_grid
 
 
 @jit_inline
@@ -90,8 +90,8 @@ def _grid_clearance(world: World, ax: float, ay: float, bx: float, by: float, be
     """Lower ``best`` by the solid cells near the path, in cells; free ones are skipped by ``solid_gap``."""
     scale = 1.0 / world.solid_resolution
     rows, columns = world.solid.shape
-    ax, bx = (ax - world.solid_origin[0]) * scale, (bx - world.solid_origin[0]) * scale
-    ay, by = (ay - world.solid_origin[1]) * scale, (by - world.solid_origin[1]) * scale
+    (ax, ay), (bx, by) = in_grid(world, ax, ay), in_grid(world, bx, by)
+    ax, ay, bx, by = ax * scale, ay * scale, bx * scale, by * scale
     reach = best * scale
     left, right = min(ax, bx) - reach, max(ax, bx) + reach
     low, high = min(ay, by) - reach, max(ay, by) + reach

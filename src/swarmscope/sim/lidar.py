@@ -16,7 +16,7 @@ import numpy.typing as npt
 from swarmscope._jit import jit, jit_inline
 from swarmscope.errors import ConfigError
 from swarmscope.geometry import rough_angle
-from swarmscope.sim.world import PIECE_M, World, bin_index, bin_run
+from swarmscope.sim.world import PIECE_M, World, bin_index, bin_run, in_grid
 
 Bytes = npt.NDArray[np.uint8]
 Ranges = npt.NDArray[np.float32]
@@ -209,7 +209,10 @@ def _cast_grid(
 ) -> None:
     """Walk every beam through the occupancy grid."""
     resolution = world.solid_resolution
-    px, py = (x - world.solid_origin[0]) / resolution, (y - world.solid_origin[1]) / resolution
+    px, py = in_grid(world, x, y)
+    px, py = px / resolution, py / resolution
+    c, s = world.solid_turn[0], world.solid_turn[1]
+    cos_yaw, sin_yaw = c * cos_yaw + s * sin_yaw, c * sin_yaw - s * cos_yaw
     for n in range(out.shape[0]):
         dx = cos_yaw * beams.cos[n] - sin_yaw * beams.sin[n]
         dy = sin_yaw * beams.cos[n] + cos_yaw * beams.sin[n]

@@ -98,7 +98,8 @@ class Wall(_Model):
 
 
 class Grid(_Model):
-    """An occupancy grid: cell (row, col) covers ``origin + resolution * [col, row]`` to one cell further [m].
+    """An occupancy grid: cell (row, col) covers ``origin + resolution * [col, row]`` to one cell further [m], all of
+    it turned by ``yaw`` round the origin.
 
     Row 0 is at the bottom. ``rows`` lists the solid runs ``[row, first_col, last_col]``, both included.
     """
@@ -109,6 +110,8 @@ class Grid(_Model):
     """Side of a cell [m]."""
     origin: Point
     """Lower left corner x, y [m]."""
+    yaw: Number = 0.0
+    """Direction in which the columns count, counter-clockwise from x [rad]."""
     width: Annotated[int, Field(ge=1)]
     """Columns."""
     height: Annotated[int, Field(ge=1)]
@@ -195,6 +198,8 @@ class World(NamedTuple):
     """(H, W) steps (8 neighbours) from a cell to the nearest solid cell: 0 = solid itself, at most 255."""
     solid_origin: Floats
     """(2,) lower left corner of cell (0, 0) [m]."""
+    solid_turn: Floats
+    """(2,) direction in which the columns count: cos, sin."""
     solid_resolution: float
     """Side of a cell [m]."""
 
@@ -238,7 +243,7 @@ def _compiled(spec: WorldSpec) -> World:
     circle_order, circle_start = _counting_sort(bin_of(circles), columns * rows)
     segment_order, segment_start = _counting_sort(bin_of(midpoints), columns * rows)
     polygon_items, polygon_start = _polygon_entries(polygons, x0, y0, size, columns, rows)
-    solid, origin, resolution = _solid_arrays(spec)
+    solid, origin, turn, resolution = _solid_arrays(spec)
     return World(
         circles=np.ascontiguousarray(circles[circle_order]),
         radius_max=float(circles[:, 2].max(initial=0.0)),
@@ -250,8 +255,17 @@ def _compiled(spec: WorldSpec) -> World:
         solid=solid,
         solid_gap=_gap(solid),
         solid_origin=origin,
+        solid_turn=turn,
         solid_resolution=resolution,
     )
+
+
+@jit_inline
+def in_grid(world: World, x: float, y: float) -> tuple[float, float]:
+    """Return where (x, y) [m] lies in the occupancy grid, along columns and along rows [m]."""
+    dx, dy = x - world.solid_origin[0], y - world.solid_origin[1]
+    c, s = world.solid_turn[0], world.solid_turn[1]
+    return c * dx + s * dy, c * dy - s * dx
 
 
 @jit_inline
@@ -274,7 +288,9 @@ def bin_run(bins: Bins, start: Ints, row: int, x: float, y: float, reach: float)
     return start[row * bins.columns + first], start[row * bins.columns + last + 1]
 
 
-def grid_from_solid(solid: npt.ArrayLike, resolution: float, origin: tuple[float, float]) -> Grid:
+def grid_from_solid(
+    solid: npt.ArrayLike, resolution: float, origin: tuple[float, float], yaw: float = 0.0
+) -> Grid:
     """Return the `Grid` of an array (H, W), row 0 at the bottom, in which everything but 0 is solid."""
     cells = np.asarray(solid) != 0
     if cells.ndim != 2:
@@ -282,7 +298,15 @@ def grid_from_solid(solid: npt.ArrayLike, resolution: float, origin: tuple[float
     edges = np.diff(np.pad(cells.astype(np.int8), ((0, 0), (1, 1))), axis=1)
     starts, ends = np.argwhere(edges == 1), np.argwhere(edges == -1)
     runs = np.column_stack([starts, ends[:, 1] - 1]).tolist()
-    return Grid(resolution=resolution, origin=origin, width=cells.shape[1], height=cells.shape[0], rows=runs)
+    height, width = cells.shape
+    return Grid(resolution=resolution, origin=origin, yaw=yaw, width=width, height=height, rows=runs)
+
+
+def grid_corners(grid: Grid) -> Floats:
+    """Return the corners (4, 2) of all cells together [m], counter-clockwise from the origin."""
+    c, s = math.cos(grid.yaw), math.sin(grid.yaw)
+    right, up = np.array([c, s]) * grid.resolution * grid.width, np.array([-s, c]) * grid.resolution * grid.height
+    return np.asarray(np.array(grid.origin) + np.array([0.0 * right, right, right + up, up]))
 
 
 def solid_from_grid(grid: Grid) -> Bytes:
@@ -387,12 +411,13 @@ def _polygon_entries(
     return np.ascontiguousarray(np.concatenate(items)[order]), start
 
 
-def _solid_arrays(spec: WorldSpec) -> tuple[Bytes, Floats, float]:
+def _solid_arrays(spec: WorldSpec) -> tuple[Bytes, Floats, Floats, float]:
     for obstacle in spec.obstacles:
         if isinstance(obstacle, Grid):
             origin = np.asarray(obstacle.origin, dtype=np.float64)
-            return solid_from_grid(obstacle), origin, float(obstacle.resolution)
-    return np.zeros((0, 0), dtype=np.uint8), np.zeros(2), 1.0
+            turn = np.array([math.cos(obstacle.yaw), math.sin(obstacle.yaw)])
+            return solid_from_grid(obstacle), origin, turn, float(obstacle.resolution)
+    return np.zeros((0, 0), dtype=np.uint8), np.zeros(2), np.array([1.0, 0.0]), 1.0
 
 
 def _gap(solid: Bytes) -> Bytes:

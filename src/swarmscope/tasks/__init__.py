@@ -9,7 +9,7 @@ from swarmscope.sim.world import Circle, Polygon, Wall, WorldSpec
 from swarmscope.tasks._check import check_setup
 from swarmscope.tasks._contract import Setup, Task, load_task, task_file, task_names
 from swarmscope.tasks._made import setup_of_task
-from swarmscope.tasks._on_map import place_on_map
+from swarmscope.tasks._on_map import Wanted, place_on_map, place_wanted
 
 __all__ = [
     "Bounds",
@@ -19,10 +19,12 @@ __all__ = [
     "Task",
     "UnsolvableWorldError",
     "Wall",
+    "Wanted",
     "WorldSpec",
     "check_setup",
     "load_task",
     "place_on_map",
+    "place_wanted",
     "setup_of_task",
     "task_file",
     "task_names",

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from swarmscope._jit import jit_alloc as jit
 from swarmscope.geometry import point_segment_distance
-from swarmscope.sim.world import World, WorldSpec
+from swarmscope.sim.world import World, WorldSpec, in_grid
 
 Floats = NDArray[np.float64]
 Bytes = NDArray[np.uint8]
@@ -61,8 +61,7 @@ def rasterise(
     _paint_segments(blocked, x0, y0, resolution, world.segments, inflate)
     for first, last in pairwise(world.vertex_start):
         _paint_polygon(blocked, x0, y0, resolution, world.vertices[first:last])
-    left, bottom = float(world.solid_origin[0]), float(world.solid_origin[1])
-    _paint_solid(blocked, x0, y0, resolution, world.solid, left, bottom, world.solid_resolution, inflate)
+    _paint_solid(blocked, x0, y0, resolution, world, inflate)
     return Raster(blocked, x0, y0, resolution)
 
 
@@ -218,25 +217,26 @@ def _is_inner(solid: Bytes, row: int, column: int) -> bool:
 
 @jit
 def _paint_solid(
-    blocked: Bytes, x0: float, y0: float, resolution: float,
-    solid: Bytes, left: float, bottom: float, cell: float, inflate: float,
-) -> None:  # fmt: skip
-    """Paint squares of side ``cell``, rounded by ``inflate`` where they are at the rim of something solid."""
+    blocked: Bytes, x0: float, y0: float, resolution: float, world: World, inflate: float
+) -> None:
+    """Paint the solid cells of the grid, rounded by ``inflate`` where they are at the rim of something solid."""
+    solid, cell = world.solid, world.solid_resolution
+    c, s = world.solid_turn[0], world.solid_turn[1]
+    half = 0.5 * cell * (abs(c) + abs(s))
     for i in range(solid.shape[0]):
         for j in range(solid.shape[1]):
             if solid[i, j] == 0:
                 continue
             reach = 0.0 if _is_inner(solid, i, j) else inflate
-            low_x, low_y = left + j * cell, bottom + i * cell
-            high_x, high_y = low_x + cell, low_y + cell
-            row0, row1 = _span(low_y - reach, high_y + reach, y0, resolution, blocked.shape[0])
-            column0, column1 = _span(low_x - reach, high_x + reach, x0, resolution, blocked.shape[1])
+            low_x, low_y = j * cell, i * cell
+            u, v = low_x + 0.5 * cell, low_y + 0.5 * cell
+            middle_x, middle_y = world.solid_origin[0] + c * u - s * v, world.solid_origin[1] + s * u + c * v
+            row0, row1 = _span(middle_y - half - reach, middle_y + half + reach, y0, resolution, blocked.shape[0])
+            column0, column1 = _span(middle_x - half - reach, middle_x + half + reach, x0, resolution, blocked.shape[1])
             for row in range(row0, row1):
-                y = y0 + (row + 0.5) * resolution
-                dy = max(0.0, low_y - y, y - high_y)
                 for column in range(column0, column1):
-                    x = x0 + (column + 0.5) * resolution
-                    dx = max(0.0, low_x - x, x - high_x)
+                    u, v = in_grid(world, x0 + (column + 0.5) * resolution, y0 + (row + 0.5) * resolution)
+                    dx, dy = max(0.0, low_x - u, u - low_x - cell), max(0.0, low_y - v, v - low_y - cell)
                     if (dx == 0.0 and dy == 0.0) or dx * dx + dy * dy < reach * reach:
                         blocked[row, column] = 1
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -101,11 +102,12 @@ def _draw_obstacles(axes: Axes, obstacles: list[Obstacle]) -> None:
 def _draw_grid(axes: Axes, grid: Grid) -> None:
     from matplotlib.collections import PolyCollection
 
-    (x0, y0), side = grid.origin, grid.resolution
+    side, c, s = grid.resolution, math.cos(grid.yaw), math.sin(grid.yaw)
     runs = np.asarray(grid.rows, dtype=np.float64).reshape(-1, 3)
-    low, left, right = y0 + side * runs[:, 0], x0 + side * runs[:, 1], x0 + side * (runs[:, 2] + 1.0)
+    low, left, right = side * runs[:, 0], side * runs[:, 1], side * (runs[:, 2] + 1.0)
     corners = np.array([[left, low], [right, low], [right, low + side], [left, low + side]])
-    axes.add_collection(PolyCollection(list(corners.transpose(2, 0, 1)), color=SOLID, lw=0.2))
+    turned = np.array(grid.origin) + corners.transpose(2, 0, 1) @ np.array([[c, s], [-s, c]])
+    axes.add_collection(PolyCollection(list(turned), color=SOLID, lw=0.2))
 
 
 def _draw_robots(axes: Axes, run: RunData) -> None:
