@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from command_line import SMALL, refused, swarmscope
 
 from swarmscope.cli import run as run_module
 from swarmscope.judging.run_folder import RUN_FILES, read_config, read_metrics, read_world
+from swarmscope.judging.run_names import usual_folder
 from swarmscope.scenarios.read import parse_scenario
 from swarmscope.sim.maps import save_map
 from swarmscope.sim.world import grid_from_solid
@@ -44,10 +46,39 @@ def test_of_many_failures_only_the_first_are_printed(tmp_path):
     assert "and 5 more robots, all named in metrics.json" in result.stdout
 
 
-def test_default_folder_is_named_after_task_planner_and_seed(tmp_path, monkeypatch):
+def test_default_folder_is_named_after_what_is_not_the_default(tmp_path, monkeypatch):
+    """Place, planner, seed; and a hash of all else, so that a run with another parameter has another folder."""
     monkeypatch.chdir(tmp_path)
-    swarmscope("run", *SMALL, "--seed", 7)
-    assert read_metrics(Path("runs/T1-nav-scope-7"))["run"]["seed"] == 7
+    for changes in ((), ("--set", "robot.v_max_mps=0.6"), ("--set", "robot.v_max_mps=0.7")):
+        assert swarmscope("run", *SMALL, "--seed", 7, *changes).exit_code == 0
+    folders = sorted(Path("runs").iterdir())
+    assert len(folders) == 3
+    assert all(re.fullmatch(r"T1-nav-scope-7-[0-9a-f]{6}", folder.name) for folder in folders)
+    speeds = [read_config(folder)["robot"]["v_max_mps"] for folder in folders]
+    assert sorted(speeds) == [0.5, 0.6, 0.7]
+    assert swarmscope("run", *SMALL, "--seed", 7).exit_code == 0  # the same run takes its own place
+    assert len(list(Path("runs").iterdir())) == 3
+
+
+def test_nothing_but_defaults_needs_no_hash():
+    folder = usual_folder(parse_scenario({"task": {"name": "T2"}, "seed": 4, "planner": {"name": "dh-bug"}}, "test"))
+    assert folder == Path("runs/T2-dh-bug-4")
+    place = {"world": {"bounds": [0, 0, 9, 9]}, "starts": [[1, 1, 0]], "goals": [[5, 5]]}
+    names = {usual_folder(parse_scenario({"place": place | {"goals": [[x, 5]]}, "robots": 1}, "test")) for x in (5, 6)}
+    assert len(names) == 2
+
+
+def test_another_run_is_not_written_over_unless_it_is_forced(tmp_path):
+    words = ("run", *SMALL, "--no-pictures", "--out", tmp_path / "r")
+    assert swarmscope(*words, "--seed", 1).exit_code == 0
+    before = (tmp_path / "r/trajectory.npz").read_bytes()
+    refused = swarmscope(*words, "--seed", 2)
+    assert refused.exit_code == 2
+    assert "holds another run ('seed' differs): give another --out, or --force" in " ".join(refused.output.split())
+    assert (tmp_path / "r/trajectory.npz").read_bytes() == before
+    assert swarmscope(*words, "--seed", 1).exit_code == 0
+    assert swarmscope(*words, "--seed", 2, "--force").exit_code == 0
+    assert read_config(tmp_path / "r")["seed"] == 2
 
 
 def test_config_of_a_run_gives_the_same_run(tmp_path):

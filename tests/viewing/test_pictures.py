@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +12,17 @@ from fake_run import make_fake_run
 from PIL import Image
 
 from swarmscope.errors import InputFileError
+from swarmscope.sim.world import grid_from_solid
 from swarmscope.viewing.pictures import write_picture
-from swarmscope.viewing.run_data import crash_ticks, decision_ticks, headline, load_run, summary_rows
+from swarmscope.viewing.run_data import (
+    WorldFile,
+    crash_ticks,
+    decision_ticks,
+    headline,
+    load_run,
+    shown_bounds,
+    summary_rows,
+)
 
 
 @pytest.fixture
@@ -51,6 +61,20 @@ def test_picture_leaves_matplotlib_settings_alone(folder: Path) -> None:
         strange = write_picture(folder).read_bytes()
         assert mpl.rcParams["font.size"] == 33.0
     assert write_picture(folder).read_bytes() == strange
+
+
+@pytest.mark.parametrize("yaw", [0.0, math.pi / 2])
+def test_of_a_map_only_the_free_part_is_shown(yaw) -> None:
+    """100 x 80 cells of 0.1 m; free are columns 40 to 59, rows 30 to 39: 1 m of what surrounds them is shown."""
+    solid = np.ones((80, 100), np.uint8)
+    solid[30:40, 40:60] = 0
+    grid = grid_from_solid(solid, 0.1, (0.0, 0.0), yaw)
+    robot = {"id": 0, "radius": 0.1, "start": (5.0, 3.5, 0.0), "goal": (4.5, 3.5)}
+    world = WorldFile(robots=[robot], obstacles=[grid], bounds=(-10.0, -10.0, 10.0, 10.0))
+    box = (3.0, 2.0, 7.0, 5.0) if yaw == 0.0 else (-5.0, 3.0, -2.0, 7.0)
+    assert shown_bounds(world) == pytest.approx(box)
+    assert shown_bounds(world.model_copy(update={"bounds": (4.0, 0.0, 6.0, 9.0)}))[0] == 4.0 or yaw > 0.0
+    assert shown_bounds(world.model_copy(update={"obstacles": []})) == world.bounds
 
 
 def test_no_half_written_files_stay(folder: Path) -> None:

@@ -118,7 +118,11 @@ def run(
         list[str] | None,
         typer.Option("--set", metavar="KEY.PATH=VALUE", help="Any key of a scenario; repeatable."),
     ] = None,
-    out: Annotated[Path | None, typer.Option(help="Run folder, else runs/<task>-<planner>-<seed>.")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Run folder, else runs/<task>-<planner>-<seed>, and a hash of what is not the default."),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Write over the run of another scenario.")] = False,
     threads: Annotated[int, typer.Option(min=1, max=256, help="Threads; the result is the same.")] = 1,
     pictures: Annotated[bool, typer.Option(help="Make paths.png and replay.html.")] = True,
     no_code: NoCode = False,
@@ -130,7 +134,7 @@ def run(
     options |= {"map.resolution_m": resolution, "map.trips": trips, "map.first_trip": first_trip}
     options |= {"map.number": number}
     options |= {"map.starts": start, "map.goals": goal}
-    run_command(scenario, task, map_, planner, options, set_ or [], out, threads, pictures, not no_code)
+    run_command(scenario, task, map_, planner, options, set_ or [], out, threads, pictures, not no_code, force)
 
 
 @app.command(

@@ -15,12 +15,13 @@ from swarmscope.cli._code import announce, files_of, refuse_code
 from swarmscope.cli._console import PlainConsole
 from swarmscope.errors import ConfigError
 from swarmscope.experiments.warm_up import kernels_are_cold
-from swarmscope.judging.run import place_name, run_scenario
-from swarmscope.judging.run_folder import check_out
+from swarmscope.judging.run import run_scenario
+from swarmscope.judging.run_folder import check_out, check_same
+from swarmscope.judging.run_names import usual_folder
 from swarmscope.scenarios.overrides import PLACES, choose, set_key, set_path
 from swarmscope.scenarios.read import parse_scenario, read_scenario_file
 from swarmscope.scenarios.scenario import Scenario
-from swarmscope.user_files import short_name
+from swarmscope.scenarios.to_kernels import complete
 from swarmscope.viewing.progress import progress_bar
 
 MOST_FAILURES = 10
@@ -59,15 +60,17 @@ def run_command(
     threads: int,
     pictures: bool,
     code: bool = True,
+    force: bool = False,
 ) -> None:
     """Run what the command line asks for and print what came out."""
     scenario = read_options(file, task, map_, planner, options, changes)
     files = files_of([scenario])
     if not code:
         refuse_code(files)
-    planner_name = short_name(scenario.planner.name)
-    place = out or Path("runs") / f"{place_name(scenario)}-{planner_name}-{scenario.seed}"
+    place = out or usual_folder(scenario)
     check_out(place)
+    if not force:
+        check_same(place, complete(scenario))
     announce(files)
     if kernels_are_cold(scenario.planner.name):
         print("compiling the kernels for the first time (about 40 s, kept on disk) ...", file=sys.stderr)

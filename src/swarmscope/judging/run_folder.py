@@ -82,6 +82,17 @@ def check_out(out: Path) -> Path:
     return place
 
 
+def check_same(out: Path, config: Mapping[str, Any]) -> None:
+    """Raise a ``ConfigError`` with the first key that differs if there is the finished run of another scenario."""
+    place = _place(out)
+    if not (place / CONFIG).is_file():
+        return
+    there, here = plain(read_config(place)), plain(config)
+    for key in dict.fromkeys([*there, *here]):
+        if there.get(key) != here.get(key):
+            raise ConfigError(str(place), f"holds another run ('{key}' differs): give another --out, or --force")
+
+
 def read_metrics(run_dir: Path) -> dict[str, Any]:
     """Return the figures of a finished run; anything else raises ``InputFileError``."""
     return _read_json(_finished(run_dir) / METRICS)

@@ -17,6 +17,7 @@ from swarmscope.viewing.run_data import (
     headline,
     load_run,
     replace_file,
+    shown_bounds,
     summary_rows,
 )
 
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
 
 LONG_SIDE_IN = 9.0
 """Longer side of the drawn world on paper [inch]."""
+
+MOST_NUMBERS = 60
+"""More robots have no numbers in the picture: one could not read them."""
 
 INK, FAINT, GROUND = "#2b333b", "#7b8590", "#fbfaf7"
 SOLID, SOLID_EDGE = "#c9d2c4", "#a4b19d"
@@ -61,8 +65,8 @@ def _render(run: RunData) -> bytes:
 
 
 def _extent(run: RunData) -> tuple[float, float, float, float]:
-    """Return x0, y0, x1, y1 [m] around the bounds and everything a robot did."""
-    x0, y0, x1, y1 = run.world.bounds
+    """Return x0, y0, x1, y1 [m] around what is worth looking at and everything a robot did."""
+    x0, y0, x1, y1 = shown_bounds(run.world)
     margin = 2.0 * max(robot.radius for robot in run.world.robots)
     xs = np.concatenate([run.trajectory.x_m.ravel(), [robot.goal[0] for robot in run.world.robots]])
     ys = np.concatenate([run.trajectory.y_m.ravel(), [robot.goal[1] for robot in run.world.robots]])
@@ -122,6 +126,8 @@ def _draw_robots(axes: Axes, run: RunData) -> None:
         x, y = trajectory.x_m[:, i], trajectory.y_m[:, i]
         axes.plot(x, y, color=colour, lw=1.5, alpha=0.9, solid_joinstyle="round", solid_capstyle="round")
         axes.scatter(robots[i].start[0], robots[i].start[1], s=22, color=[colour], lw=0, zorder=3)
+        if len(robots) <= MOST_NUMBERS:
+            _draw_number(axes, i, robots[i].start[:2], colour)
         chosen = decision_ticks(trajectory, i)
         axes.scatter(
             x[chosen], y[chosen], s=26, marker="D", facecolor="white", edgecolor=[colour], lw=1.1, zorder=4
@@ -129,6 +135,14 @@ def _draw_robots(axes: Axes, run: RunData) -> None:
         if trajectory.collided[i]:
             end = x[ends[i]], y[ends[i]]
             axes.scatter(*end, marker="X", s=95, facecolor=CRASH, edgecolor="white", lw=1.0, zorder=5)
+
+
+def _draw_number(axes: Axes, robot: int, place: tuple[float, float], colour: Any) -> None:
+    """Write a robot's number beside its start."""
+    from matplotlib.patheffects import withStroke
+
+    words = {"fontsize": 7, "color": colour, "path_effects": [withStroke(linewidth=2.0, foreground=GROUND)]}
+    axes.annotate(str(robot), place, xytext=(4, 4), textcoords="offset points", zorder=6, **words)
 
 
 def _draw_words(axes: Axes, figure: Any, run: RunData) -> None:

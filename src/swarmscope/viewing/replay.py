@@ -20,6 +20,7 @@ from swarmscope.viewing.run_data import (
     headline,
     load_run,
     replace_file,
+    shown_bounds,
     summary_rows,
 )
 
@@ -80,7 +81,7 @@ def page_data(run: RunData) -> dict[str, Any]:
         "failures": failure_reasons(run),
         "robots": [robot.model_dump() for robot in run.world.robots],
         "obstacles": [obstacle.model_dump() for obstacle in run.world.obstacles],
-        "bounds": run.world.bounds,
+        "bounds": shown_bounds(run.world),
         "wall_m": WALL_M,
         "state_names": [str(name) for name in trajectory.state_names],
         "reason_names": [str(name) for name in trajectory.reason_names],

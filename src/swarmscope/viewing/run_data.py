@@ -16,7 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from swarmscope.errors import InputFileError
 from swarmscope.judging.cases import CHOICE_COLUMNS, OPINION_COLUMNS
 from swarmscope.judging.run_folder import TRAJECTORY, WORLD, read_metrics, read_trajectory, read_world
-from swarmscope.sim.world import Length, Number, Obstacle, Point
+from swarmscope.sim.world import Grid, Length, Number, Obstacle, Point, grid_corners, solid_from_grid
 
 Array = npt.NDArray[Any]
 
@@ -40,6 +40,31 @@ class WorldFile(BaseModel):
     robots: list[RobotEntry] = Field(min_length=1)
     obstacles: list[Obstacle]
     bounds: tuple[Number, Number, Number, Number]
+
+
+RIM_CELLS = 10
+"""So much of what surrounds the free cells of a map is shown."""
+
+
+def shown_bounds(world: WorldFile) -> tuple[float, float, float, float]:
+    """Return x0, y0, x1, y1 [m] of what is worth looking at: the bounds, of a map its free cells and a rim.
+
+    Maps made by robots are mostly margin that nobody has seen.
+    """
+    x0, y0, x1, y1 = world.bounds
+    grid = next((obstacle for obstacle in world.obstacles if isinstance(obstacle, Grid)), None)
+    free = np.zeros((0, 0), np.bool_) if grid is None else solid_from_grid(grid) == 0
+    if grid is None or not free.any():
+        return x0, y0, x1, y1
+    rows, columns = np.flatnonzero(free.any(axis=1)), np.flatnonzero(free.any(axis=0))
+    low = np.array([columns[0], rows[0]]) - RIM_CELLS
+    high = np.array([columns[-1], rows[-1]]) + 1 + RIM_CELLS
+    origin, right, _, up = grid_corners(grid)
+    along, across = (right - origin) / grid.width, (up - origin) / grid.height
+    corners = origin + np.outer([low[0], high[0], high[0], low[0]], along)
+    corners += np.outer([low[1], low[1], high[1], high[1]], across)
+    (a, b), (c, d) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
+    return max(x0, a), max(y0, b), min(x1, c), min(y1, d)
 
 
 class Trajectory(NamedTuple):
