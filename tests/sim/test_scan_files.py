@@ -90,7 +90,7 @@ def test_missing_empty_folder(tmp_path: Path, suffix: str) -> None:
 
 def test_unknown_kind_of_file(tmp_path: Path) -> None:
     (tmp_path / "a.bag").write_bytes(b"x")
-    _refused(tmp_path / "a.bag", r"\.npz or \.csv")
+    _refused(tmp_path / "a.bag", r"\.npz, \.csv")
 
 
 @pytest.mark.parametrize(
@@ -160,14 +160,13 @@ def test_archive_that_claims_too_much(tmp_path: Path, monkeypatch: pytest.Monkey
         ({"ranges_m": np.array([["a", "b"]])}, "floats"),
         ({"ranges_m": None, "ranges_cm": np.ones((2, 3), np.int32)}, "unsigned"),
         ({"ranges_m": np.full((2, 3), np.nan)}, "only NaN"),
-        ({"ranges_m": np.array([[1.0, 2.0], [3.0, -0.01]])}, "scan 1, beam 1: negative"),
         ({"angle_min": None}, "no 'angle_min'"),
         ({"angle_min": np.nan}, "one finite number"),
         ({"angle_min": np.ones(2)}, "one finite number"),
         ({"angle_min": "east"}, "one finite number"),
-        ({"angle_increment": 0.0}, "counter-clockwise"),
-        ({"angle_increment": -0.5}, "counter-clockwise"),
-        ({"angle_increment": 4.0}, "more than one turn"),
+        ({"angle_increment": 0.0}, "angle_increment is 0"),
+        ({"angle_increment": 4000.0}, "more than one turn"),
+        ({"angle_increment": -4000.0}, "more than one turn"),
         ({"range_max": 0.1}, "0 <= min < max"),
         ({"range_min": -1.0}, "0 <= min < max"),
         ({"stamp_s": np.zeros(3)}, "shape"),
@@ -185,11 +184,17 @@ def test_wrong_arrays(tmp_path: Path, changes: dict[str, object], match: str) ->
     [
         ("1,2,3\n", "no 'angle_min'"),
         (HEADER, "shape"),
-        (HEADER + "1,2,3\n1,2\n", "line 3: 2 readings where the first scan has 3"),
         (HEADER + "1,2,3\n1,2,3.", "torn"),
         (HEADER + "1,2,x\n", "line 2: 'x' is not a number"),
         (HEADER + "1,,3\n", "line 2: '' is not a number"),
-        (HEADER + "1,-2,3\n", "negative"),
+        (HEADER + "1,2_0,3\n", "line 2: '2_0' is not a number"),
+        (HEADER + "1,٣,3\n", "is not a number"),
+        ("# angle_min=0 angle_min=1\n" + HEADER + "1,2,3\n", "line 1: 'angle_min' is given twice"),
+        ("%time,ranges0,ranges0\n1,2,3\n", "column 'ranges0' is there twice"),
+        ("angle_min,ranges0,ranges1\n1,2\n", "line 2: 2 columns where the first line names 3"),
+        ("FLASER 3 1 2\n", "line 1: torn: it ends after 4 words"),
+        ("FLASER many 1 2\n", "line 1: 'many' is not a number"),
+        ("FLASER 1e300 1 2\n", "line 1: torn"),
         (HEADER + "nan,nan,nan\n", "only NaN"),
         ("# angle_mni=0\n" + HEADER + "1,2,3\n", "unknown key 'angle_mni'; did you mean 'angle_min'"),
         (HEADER.replace("=8", "=far") + "1,2,3\n", "line 1: 'far' is not a number"),

@@ -85,8 +85,8 @@ SHARED = np.dtype(
         ("track_id", np.int64, PEERS),  # -1 = free
         ("track_x", np.float64, PEERS),
         ("track_y", np.float64, PEERS),
-        ("track_was_x", np.float64, PEERS),  # where it was a tick ago, seen from here
-        ("track_was_y", np.float64, PEERS),
+        ("track_was_x", np.float32, PEERS),  # where it was a tick ago, seen from here
+        ("track_was_y", np.float32, PEERS),
         ("track_vx", np.float64, PEERS),
         ("track_vy", np.float64, PEERS),
         ("track_yaw", np.float64, PEERS),  # compass frame [rad]

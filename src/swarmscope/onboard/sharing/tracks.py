@@ -51,9 +51,10 @@ def update_tracks(percept: Row, shared: Row, rig: Rig, dx: float, dy: float) -> 
         if now - shared["track_seen_s"][t] > rig.guarding.persistence_s:
             shared["track_id"][t] = -1
             continue
-        shared["track_was_x"][t], shared["track_was_y"][t] = shared["track_x"][t] - dx, shared["track_y"][t] - dy
-        shared["track_x"][t] = shared["track_was_x"][t] + shared["track_vx"][t] * dt
-        shared["track_y"][t] = shared["track_was_y"][t] + shared["track_vy"][t] * dt
+        x, y = shared["track_x"][t] - dx, shared["track_y"][t] - dy
+        shared["track_was_x"][t], shared["track_was_y"][t] = x, y
+        shared["track_x"][t] = x + shared["track_vx"][t] * dt
+        shared["track_y"][t] = y + shared["track_vy"][t] * dt
     c, s = math.cos(percept["compass"]), math.sin(percept["compass"])
     for k in range(percept["n_neighbours"]):
         x = c * percept["neighbour_x"][k] - s * percept["neighbour_y"][k]
