@@ -10,7 +10,7 @@ import pytest
 
 from helpers import circles_world, one_robot, rig_of, scan_at
 from swarmscope.errors import ConfigError, InputFileError
-from swarmscope.experiments.perceive import perceive, write_features
+from swarmscope.experiments.perceive import Use, perceive, write_features
 from swarmscope.onboard.perception.safety import safe_directions
 from swarmscope.onboard.rig import AHEAD
 from swarmscope.onboard.tick import own_features
@@ -89,7 +89,7 @@ def test_turning_the_sensor_turns_the_features(forest_scans):
 
 def test_returns_beyond_the_robots_range_count_as_none():
     far = np.full(360, 7.0, np.float32)
-    seen = perceive(log_of(far), range_m=5.0)
+    seen = perceive(log_of(far), Use(range_m=5.0))
     assert np.isinf(seen.ranges_m).all() and seen.safe.all() and len(seen.features[0]) == 0
 
 
@@ -124,13 +124,13 @@ def test_a_hole_in_which_a_body_fits_closes_its_directions():
 def test_the_log_itself_is_not_changed(forest_scans):
     log = log_of(forest_scans)
     before = log.ranges_m.copy()
-    perceive(log, range_m=2.0, beam_step=2)
+    perceive(log, Use(range_m=2.0, beam_step=2))
     assert np.array_equal(log.ranges_m, before)
 
 
 def test_beam_step_takes_every_kth_beam(forest_scans):
     log = log_of(forest_scans)
-    seen = perceive(log, beam_step=3)
+    seen = perceive(log, Use(beam_step=3))
     assert seen.safe.shape == (3, 120) and seen.rig.sensor.wraps
     assert np.allclose(np.diff(seen.angles), 3.0 * log.increment)
     assert np.array_equal(seen.ranges_m[0][np.isfinite(seen.ranges_m[0])], _finite(log.ranges_m[0, ::3]))
@@ -154,12 +154,12 @@ def _finite(values):
 )
 def test_impossible_options_are_refused(options, words, forest_scans):
     with pytest.raises(ConfigError, match=words):
-        perceive(log_of(forest_scans), **options)
+        perceive(log_of(forest_scans), Use(**options))
 
 
 def test_a_range_below_the_scanners_smallest_is_refused(forest_scans):
     with pytest.raises(ConfigError, match="smallest range"):
-        perceive(log_of(forest_scans, range_min=0.5), range_m=0.4)
+        perceive(log_of(forest_scans, range_min=0.5), Use(range_m=0.4))
 
 
 def test_features_table_holds_every_feature(forest_scans, tmp_path):

@@ -154,18 +154,35 @@ def config(
     config_command(task, planner, schema)
 
 
-@app.command(epilog="Example: [bold]swarmscope perceive malaga_telecom_2006_sick_lms --out runs/perceive[/bold]")
+@app.command(
+    epilog="Examples:\n\n"
+    "[bold]swarmscope perceive malaga_telecom_2006_sick_lms --out runs/perceive[/bold]\n\n"
+    "[bold]swarmscope perceive turtlebot.csv --no-return 0 --range 3.5[/bold]\n\n"
+    "[bold]swarmscope perceive scans.csv --mask 40..50 --mask=-50..-40[/bold]"
+)
 def perceive(
-    scans: Annotated[str, typer.Argument(help="Scan file (.npz or .csv), or the name of a packaged one.")],
+    scans: Annotated[
+        str, typer.Argument(help="Scan file (.npz, .csv, .txt, CARMEN .log), or the name of a packaged one.")
+    ],
     out: Annotated[Path | None, typer.Option(help="Folder for features.csv and perceive.png.")] = None,
     range_m: Annotated[float, typer.Option("--range", help="Range that the robots use, metres.")] = 5.0,
     radius_m: Annotated[float, typer.Option("--radius", help="The robot's radius, metres.")] = 0.15,
     beam_step: Annotated[int, typer.Option(min=1, help="Use every so manieth beam.")] = 1,
+    no_return: Annotated[
+        float | None, typer.Option(help="The reading that means no return, beside inf: 0 for some LiDARs.")
+    ] = None,
+    mask: Annotated[
+        list[str] | None,
+        typer.Option(metavar="FROM..TO", help="Degrees in which the robot sees its own posts; repeatable."),
+    ] = None,
+    upside_down: Annotated[bool, typer.Option("--upside-down", help="The LiDAR is mounted upside down.")] = False,
 ) -> None:
     """Safe directions and features of recorded scans, with the time that they take."""
-    from swarmscope.cli.perceive import perceive_command
+    from swarmscope.cli.perceive import perceive_command, read_mask
+    from swarmscope.experiments.perceive import Use
 
-    perceive_command(scans, out, range_m, radius_m, beam_step)
+    masks = [read_mask(text) for text in mask or []]
+    perceive_command(scans, out, Use(range_m, radius_m, beam_step, no_return, masks, upside_down))
 
 
 @app.command(epilog="Example: [bold]swarmscope replay runs/first --open[/bold]")

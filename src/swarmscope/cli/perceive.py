@@ -2,24 +2,40 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import numpy as np
 from rich.table import Table
 
 from swarmscope.cli._console import PlainConsole
-from swarmscope.experiments.perceive import Perception, perceive, write_features
+from swarmscope.errors import ConfigError
+from swarmscope.experiments.perceive import Perception, Use, perceive, write_features
 from swarmscope.sim.scan_files import ScanLog, load_scans, scan_file
 
 
-def perceive_command(scans: str, out: Path | None, range_m: float, radius_m: float, beam_step: int = 1) -> None:
+def perceive_command(scans: str, out: Path | None, use: Use) -> None:
     """Print what a robot makes of recorded scans; with ``out`` write features and a picture there."""
     log = load_scans(scan_file(scans))
-    seen = perceive(log, range_m, radius_m, beam_step)
+    for note in log.notes:
+        print(f"{scans}: {note}", file=sys.stderr)
+    seen = perceive(log, use)
     _print_table(log, seen)
     if out is not None:
         for path in write_results(out, seen, log.name):
             print(path)
+
+
+def read_mask(text: str) -> tuple[float, float]:
+    """Return FROM..TO [degrees]."""
+    first, dots, last = text.partition("..")
+    try:
+        mask = float(first), float(last)
+    except ValueError:
+        dots = ""
+    if not dots or not np.isfinite(mask).all():
+        raise ConfigError(f"--mask {text}", "must look like FROM..TO, degrees counter-clockwise from straight ahead")
+    return mask
 
 
 def write_results(out: Path, seen: Perception, title: str) -> tuple[Path, Path]:
@@ -41,8 +57,14 @@ def _print_table(log: ScanLog, seen: Perception) -> None:
     table.add_row("scans", f"{scans}")
     table.add_row("beams of a scan", f"{beams} over {fov:.0f} degrees")
     table.add_row("range used", f"{seen.rig.sensor.range_max:g} m")
-    if seen.broken.any():
-        table.add_row("broken readings, mean per scan", f"{seen.broken.mean():.1f}, bridged where no body fits")
+    if seen.masked:
+        table.add_row("beams that see the robot itself", f"{seen.masked}, bridged")
+    if seen.below.any():
+        words = f"{seen.below.mean():.1f} of {beams}, wide holes block (--no-return {0:g}: they are none)"
+        table.add_row("below the shortest range, mean per scan", words)
+    broken = seen.broken - seen.below - seen.masked
+    if (broken > 0).any():
+        table.add_row("broken readings, mean per scan", f"{broken.mean():.1f}, bridged where no body fits")
     table.add_row("safe directions, mean per scan", f"{safe.mean():.1f} of {beams}")
     table.add_row("scans without any", f"{int((safe == 0).sum())}")
     table.add_row("features, mean and most", f"{found.mean():.1f}, {found.max()}")

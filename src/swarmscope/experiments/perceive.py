@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import csv
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from swarmscope._jit import jit
 from swarmscope.errors import ConfigError, InputFileError
 from swarmscope.onboard.body import Body
+from swarmscope.onboard.lidar import LONGEST_M, Layout, Rays, grid_of, lay_out, same_rays
 from swarmscope.onboard.perception.mend import mend
+from swarmscope.onboard.perception.reproject import Grid, Seat, reproject, settle
 from swarmscope.onboard.perception.safety import safe_directions
 from swarmscope.onboard.rig import AHEAD, Rig, make_rig
 from swarmscope.onboard.sensor import Sensor
@@ -22,6 +26,26 @@ from swarmscope.onboard.view import Swarm, new_swarm, view_of
 from swarmscope.sim.scan_files import ScanLog
 
 REPEATS = 50
+TOO_NEAR_M = 1e-6
+"""A reading of 0 is too near, whatever the scanner's shortest range."""
+MASK_SLACK_DEG = 1e-6
+
+
+class Use(NamedTuple):
+    """How a robot uses a scanner."""
+
+    range_m: float = 5.0
+    """Readings beyond it count as no return [m]."""
+    radius_m: float = 0.15
+    """The robot's radius [m]."""
+    beam_step: int = 1
+    """Use every so manieth beam only."""
+    no_return: float | None = None
+    """The reading that says that there was no return, beside +inf, as the file has it [m]."""
+    masks_deg: Sequence[tuple[float, float]] = ()
+    """Directions, from .. to counter-clockwise, in which the robot sees itself [degrees]."""
+    upside_down: bool = False
+    """Mounted upside down: what its header calls left is right."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +59,10 @@ class Perception:
     """(K, M), +inf beyond the range that the robot uses."""
     broken: np.ndarray
     """(K,) readings that were none: NaN, or too near to be of something else."""
+    below: np.ndarray
+    """(K,) those of them below the scanner's shortest range."""
+    masked: int
+    """Beams in which the robot sees itself, bridged in every scan."""
     safe: np.ndarray
     """(K, M) bool."""
     filtered_m: np.ndarray
@@ -47,20 +75,13 @@ class Perception:
     """(K,) time of one scan, mean of the repeats in a compiled loop [us]."""
 
 
-def perceive(log: ScanLog, range_m: float = 5.0, radius_m: float = 0.15, beam_step: int = 1) -> Perception:
-    """Return safe directions, filtered scan, features and message size of every scan of the log.
-
-    ``beam_step`` k uses every k-th beam only.
-    """
-    if not 0.0 < range_m <= 1000.0:
-        raise ConfigError("--range", f"must be a positive number of metres, not {range_m}")
-    if beam_step < 1:
-        raise ConfigError("--beam-step", f"must be at least 1, not {beam_step}")
-    if not range_m > log.range_min:
-        raise ConfigError("--range", f"must be above the scanner's smallest range, {log.range_min:g} m")
-    ranges = np.array(log.ranges_m[:, ::beam_step], np.float32, order="C")
-    rig = _rig_of(log, ranges.shape[1], log.increment * beam_step, range_m, radius_m)
-    ranges[ranges > rig.sensor.range_max] = np.inf
+def perceive(log: ScanLog, use: Use = Use()) -> Perception:  # noqa: B008  a tuple
+    """Return safe directions, filtered scan, features and message size of every scan of the log."""
+    _check(log, use)
+    layout = _layout_of(log, use, log.ranges_m.shape[1])
+    rig = _rig_of(log, grid_of(layout), use)
+    ranges, below = _laid_out(log, use, rig)
+    masked = int(_is_masked(layout, use.masks_deg).sum())
     scans, beams = ranges.shape
     broken, safe = np.zeros(scans, int), np.zeros((scans, beams), bool)
     filtered = np.zeros((scans, beams), np.float32)
@@ -80,7 +101,62 @@ def perceive(log: ScanLog, range_m: float = 5.0, radius_m: float = 0.15, beam_st
         found.append(np.column_stack([(angles + np.pi) % (2 * np.pi) - np.pi, distances]))
         sizes[k] = encode_features(Head(0, 0, 0, 0), angles, distances, count, rig.sensor.range_max, packet)
     directions = rig.sensor.angle_min + rig.sensor.increment * np.arange(beams)
-    return Perception(rig, directions, ranges, broken, safe, filtered, found, sizes, times)
+    return Perception(rig, directions, ranges, broken, below, masked, safe, filtered, found, sizes, times)
+
+
+def _check(log: ScanLog, use: Use) -> None:
+    """Raise a ConfigError for what cannot be."""
+    if not 0.0 < use.range_m <= LONGEST_M:
+        raise ConfigError("--range", f"must be a positive number of metres, not {use.range_m}")
+    if use.beam_step < 1:
+        raise ConfigError("--beam-step", f"must be at least 1, not {use.beam_step}")
+    if not use.range_m > log.range_min:
+        raise ConfigError("--range", f"must be above the scanner's smallest range, {log.range_min:g} m")
+    if log.ranges_m[:, :: use.beam_step].shape[1] < 2:
+        raise ConfigError(log.name, "a scan needs at least two beams")
+
+
+def _layout_of(log: ScanLog, use: Use, length: int) -> Layout:
+    """Return the layout of the used ones of ``length`` readings: counter-clockwise, a circle closed where it closes."""
+    sign = -1.0 if use.upside_down else 1.0
+    count, reach = len(range(0, length, use.beam_step)), min(use.range_m, log.range_max)
+    return lay_out(count, sign * log.angle_min, sign * log.increment * use.beam_step, reach)
+
+
+def _laid_out(log: ScanLog, use: Use, rig: Rig) -> tuple[np.ndarray, np.ndarray]:
+    """Return scans (K, M) along the rig's rays [m], and how many readings of each were too near."""
+    values = np.array(log.ranges_m[:, :: use.beam_step], np.float32, order="C")
+    if use.no_return is not None:
+        values[values == np.float32(use.no_return)] = np.inf
+    lengths = np.full(len(values), log.ranges_m.shape[1]) if log.lengths is None else log.lengths
+    sensor, below = rig.sensor, np.zeros(len(values), int)
+    scans = np.empty((len(values), sensor.beams), np.float32)
+    rays = Rays(sensor.angle_min, sensor.increment, sensor.wraps, sensor.range_max)
+    wanted, whole = Grid(rays, rig.cos, rig.sin), Layout(rays, np.arange(sensor.beams))
+    here = Seat(0.0, 0.0, 0.0, 0.0, 0.0, use.radius_m)
+    for length in np.unique(lengths).tolist():
+        layout = _layout_of(log, use, length)
+        own, raw = _is_masked(layout, use.masks_deg), np.empty(layout.order.size, np.float32)
+        for k in np.flatnonzero(lengths == length).tolist():
+            row = values[k]
+            row[layout.order[own]] = np.nan
+            used = row[layout.order]
+            below[k] = np.count_nonzero((used >= 0.0) & (used < max(log.range_min, TOO_NEAR_M)))
+            settle(row, layout.order, log.range_min, sensor.range_max, raw)
+            if same_rays(layout, whole):
+                scans[k] = raw
+            else:
+                reproject(raw, layout.rays, here, wanted, scans[k])
+    return scans, below
+
+
+def _is_masked(layout: Layout, masks_deg: Sequence[tuple[float, float]]) -> np.ndarray:
+    """Return which rays (M,) look in one of the directions from .. to [degrees], counter-clockwise."""
+    angles = np.degrees(layout.rays.start + layout.rays.increment * np.arange(layout.order.size))
+    own = np.zeros(angles.size, bool)
+    for first, last in masks_deg:
+        own |= (angles - first) % 360.0 <= (last - first) % 360.0 + MASK_SLACK_DEG
+    return own
 
 
 @jit
@@ -111,18 +187,16 @@ def write_features(path: Path, perception: Perception) -> Path:
     return path
 
 
-def _rig_of(log: ScanLog, beams: int, increment: float, range_m: float, radius_m: float) -> Rig:
+def _rig_of(log: ScanLog, grid: Layout, use: Use) -> Rig:
     """Return a robot with the log's scanner."""
-    if beams < 2:
-        raise ConfigError(log.name, "a scan needs at least two beams")
     sensor = Sensor(
-        beams=beams,
-        angle_min=float(log.angle_min),
-        increment=float(increment),
-        wraps=abs(beams * increment - 2.0 * np.pi) < 0.5 * increment,
+        beams=int(grid.order.size),
+        angle_min=grid.rays.start,
+        increment=grid.rays.increment,
+        wraps=grid.rays.closed,
         range_min=float(log.range_min),
-        range_max=float(min(range_m, log.range_max)),
+        range_max=grid.rays.reach,
         range_sigma=0.0,
         position_sigma=0.0,
     )
-    return make_rig(Body(radius_m=radius_m, half_width_m=radius_m), sensor)
+    return make_rig(Body(radius_m=use.radius_m, half_width_m=use.radius_m), sensor)

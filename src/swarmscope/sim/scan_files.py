@@ -55,6 +55,8 @@ class ScanLog:
     range_max: float
     odom: npt.NDArray[np.float64] | None
     """(K, 3) x [m], y [m], yaw [rad] by odometry, or None."""
+    lengths: npt.NDArray[np.int64] | None = None
+    """(K,) readings of each scan, the first ones; None: M."""
     notes: tuple[str, ...] = ()
     """What was strange about the file, and how it was read."""
 
@@ -171,6 +173,7 @@ def _checked_log(name: str, arrays: Mapping[str, npt.NDArray[Any]]) -> ScanLog:
         range_min=range_min,
         range_max=range_max,
         odom=_optional(arrays, "odom_xy_yaw", (scans, 3)),
+        lengths=arrays.get("lengths"),
         notes=tuple(notes),
     )
 

@@ -16,8 +16,6 @@ from swarmscope.errors import nearest_hint
 HEADER_KEYS = ("angle_min", "angle_increment", "range_min", "range_max")
 MESSAGE_KEYS = (*HEADER_KEYS, "angle_max", "time_increment", "scan_time", "frame_id", "seq", "stamp")
 """What a LaserScan's header may hold; only `HEADER_KEYS` are used."""
-SEPARATORS = re.compile(r"[,;\t ]+")
-FIELD = re.compile(r"(?:field\.)?(.+?)")
 RANGE_COLUMN = re.compile(r"(?:field\.)?ranges[\[._]?(\d+)\]?")
 NANOSECONDS = 1e-9
 STAMPS = ("header.stamp", "stamp", "%time", "time")
@@ -52,7 +50,7 @@ def arrays_from_text(text: str) -> Arrays:
             return found | _from_export(stripped, lines)
         elif stripped:
             rows.append(_Row(number, _readings(stripped, number)))
-    return found | {"ranges_m": _padded([row.values for row in rows])}
+    return found | _padded([row.values for row in rows])
 
 
 def number_in(word: str, line: int) -> float:
@@ -67,19 +65,18 @@ def number_in(word: str, line: int) -> float:
 
 def _readings(row: str, line: int) -> list[float]:
     """Return the readings of a line; a separator at its end adds none."""
-    if "," in row or ";" in row:
-        words = re.split(r"[,;]", row.rstrip(",; \t"))
-    else:
-        words = row.split()
+    row = row.rstrip(",; \t")
+    words = re.split(r"[,;]", row) if "," in row or ";" in row else row.split()
     return [number_in(word, line) for word in words]
 
 
-def _padded(rows: list[list[float]]) -> npt.NDArray[np.float64]:
-    width = max(map(len, rows), default=0)
-    filled = np.full((len(rows), width), np.nan)
+def _padded(rows: list[list[float]]) -> Arrays:
+    """Return ``ranges_m`` (K, M), NaN where a scan has ended, and how many readings each has."""
+    lengths = np.array([len(row) for row in rows], np.int64)
+    filled = np.full((len(rows), int(lengths.max(initial=0))), np.nan)
     for k, row in enumerate(rows):
         filled[k, : len(row)] = row
-    return filled
+    return {"ranges_m": filled, "lengths": lengths}
 
 
 def _header_values(header: str, line: int) -> Arrays:
@@ -124,7 +121,7 @@ def _from_export(names: str, lines: Iterator[tuple[int, str]]) -> Arrays:
                 header[key] = np.array(number_in(words[fields[key]], number))
         stamp = next((words[fields[key]] for key in STAMPS if key in fields), "")
         stamps.append(_seconds(stamp))
-    return header | {"ranges_m": _padded(rows)} | _stamps(stamps)
+    return header | _padded(rows) | _stamps(stamps)
 
 
 def _seconds(stamp: str) -> float:
@@ -164,7 +161,7 @@ def _from_carmen(text: str) -> Arrays:
         poses.append(rest[:3])
         stamps.append(rest[3])
     arrays: Arrays = {key: np.array(value) for key, value in header.items()}
-    return arrays | {"ranges_m": _padded(rows), "odom_xy_yaw": np.array(poses)} | _stamps(stamps)
+    return arrays | _padded(rows) | {"odom_xy_yaw": np.array(poses)} | _stamps(stamps)
 
 
 def _flaser(words: list[str], line: int) -> tuple[list[float], list[float], dict[str, float]]:
