@@ -270,7 +270,7 @@ def test_a_folder_with_other_things_is_not_touched_and_nothing_is_run(tmp_path, 
 
 def test_an_earlier_run_is_replaced(tmp_path):
     for seed in (1, 2):
-        swarmscope("run", *SMALL, "--seed", seed, "--out", tmp_path / "r")
+        swarmscope("run", *SMALL, "--seed", seed, "--force", "--out", tmp_path / "r")
     assert read_metrics(tmp_path / "r")["run"]["seed"] == 2
     assert [entry.name for entry in tmp_path.iterdir()] == ["r"]
 

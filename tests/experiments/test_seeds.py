@@ -76,7 +76,7 @@ def test_an_unknown_set_names_the_nearest(text):
         ("version: 2\nsets: {}\n", "has version 2"),
         ("- 1\n", "not a file of seeds"),
         ("version: 1\nsets: {a: {seeds: 1-2}}\n", "not a file of seeds"),
-        ("version: [\n", "not a file of seeds"),
+        ("version: [\n", "is not YAML"),
     ],
 )
 def test_a_wrong_file_is_named(tmp_path, text, why):

@@ -194,7 +194,7 @@ def test_scans_are_recorded_unless_they_would_be_huge(robots, choice, kept):
 def test_files_that_cannot_be_read_are_named(tmp_path):
     with pytest.raises(InputFileError, match=r"nowhere\.yaml: cannot be read \(No such file"):
         load_scenario(tmp_path / "nowhere.yaml")
-    with pytest.raises(InputFileError, match="directory"):
+    with pytest.raises(InputFileError, match="is a folder"):
         load_scenario(tmp_path)
 
 

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from swarmscope.disk.rules import Floats
 from swarmscope.errors import InputFileError
+from swarmscope.texts import read_yaml
 
 MOST_OBSTACLES = 200
 FARTHEST = 100.0
@@ -69,14 +69,7 @@ NAMED = REPORT_MAPS | {EMPTY.name: EMPTY}
 
 def read_map(path: Path) -> DiskMap:
     """Return the map of a YAML file: ``obstacles``, a list of ``center: [x, y]`` and ``radius``."""
-    try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputFileError(path, error.strerror or "cannot be read") from None
-    except (yaml.YAMLError, ValueError) as error:  # ValueError: no UTF-8, a date or a number that there is not
-        raise InputFileError(path, f"is not YAML: {' '.join(str(error).split())}") from None
-    except RecursionError:
-        raise InputFileError(path, "is not a map: brackets in brackets in brackets") from None
+    content = read_yaml(path)
     if not isinstance(content, Mapping) or set(content) - {"obstacles", "name", "about"}:
         raise InputFileError(path, "has to hold 'obstacles' (and may hold 'name' and 'about'), nothing else")
     entries = content.get("obstacles")

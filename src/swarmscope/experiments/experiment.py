@@ -16,8 +16,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from swarmscope.errors import ConfigError, UnknownNameError, nearest_hint
 from swarmscope.experiments.seeds import seed_set
 from swarmscope.judging.metrics import BETWEEN, COUNTED, METRICS
-from swarmscope.scenarios.read import find_user_files, parse_scenario, read_yaml
+from swarmscope.scenarios.read import find_user_files, parse_scenario
 from swarmscope.scenarios.scenario import Scenario
+from swarmscope.texts import read_yaml
 
 Name = Annotated[str, Field(min_length=1, max_length=60, pattern=r"^[^/\\\n]+$")]
 Keys = dict[str, Any]

@@ -7,9 +7,8 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-import yaml
-
 from swarmscope.errors import ConfigError, InputFileError, UnknownNameError
+from swarmscope.texts import read_yaml
 
 SEED_FILE = Path(__file__).parent.parent / "data" / "seeds.yaml"
 VERSION = 1
@@ -48,12 +47,10 @@ def seed_sets() -> dict[str, SeedSet]:
 def read_seed_file(path: Path) -> dict[str, SeedSet]:
     """Return the sets of a seed file."""
     try:
-        values = yaml.safe_load(path.read_text(encoding="utf-8"))
+        values = read_yaml(path)
         version, sets = values["version"], values["sets"]
         found = {name: SeedSet(_run(str(one["seeds"]), path), one["purpose"]) for name, one in sets.items()}
-    except OSError as error:
-        raise InputFileError(path, f"cannot be read ({error.strerror})") from None
-    except (yaml.YAMLError, ValueError, KeyError, TypeError, AttributeError):
+    except (ValueError, KeyError, TypeError, AttributeError):
         raise InputFileError(path, "is not a file of seeds: version, sets (name: seeds, purpose)") from None
     if version != VERSION:
         raise InputFileError(path, f"has version {version!r}, this program reads version {VERSION}")

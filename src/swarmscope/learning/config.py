@@ -5,12 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from swarmscope.errors import ConfigError, InputFileError
 from swarmscope.learning.generate import DRIVEN, PLACED, parse_set
 from swarmscope.onboard.network.model import VIEWS_M
+from swarmscope.texts import read_yaml
 
 FOLDER = Path(__file__).parent.parent / "data" / "training"
 Count = Annotated[int, Field(ge=1)]
@@ -60,15 +60,9 @@ class TrainingConfig(BaseModel):
 def read_config(name: str, changes: dict[str, Any] | None = None) -> TrainingConfig:
     """Return the configuration ``name``: a packaged one (`names`) or a YAML file, with ``changes`` on top."""
     path = FOLDER / f"{name}.yaml" if name in names() else Path(name)
-    try:
-        values = yaml.safe_load(path.read_text(encoding="utf-8")) or {}
-    except UnicodeDecodeError:
-        raise InputFileError(path, "is not text") from None
-    except OSError as error:
-        why = f"cannot be read ({error.strerror}); packaged ones are {', '.join(names())}"
-        raise InputFileError(path, why) from None
-    except yaml.YAMLError as error:
-        raise InputFileError(path, f"is not YAML ({' '.join(str(error).split())})") from None
+    if not path.exists():
+        raise InputFileError(path, f"cannot be read (there is none); packaged ones are {', '.join(names())}")
+    values = read_yaml(path) or {}
     if not isinstance(values, dict):
         raise ConfigError(str(path), "a training is a mapping of keys to values")
     return parse_config(values | (changes or {}), str(path))

@@ -10,6 +10,7 @@ import yaml
 
 from swarmscope.errors import ConfigError
 from swarmscope.scenarios.plain import plain
+from swarmscope.texts import load_yaml
 
 PLACES = ("task", "map", "place")
 
@@ -62,9 +63,10 @@ def override(values: dict[str, Any], changes: Mapping[str, Any], where: str) -> 
 def _read(text: str, change: str) -> Any:
     """Return ``text`` as YAML reads it; 1e-3, which YAML 1.1 takes for text, is a number."""
     try:
-        value = yaml.safe_load(text)
-    except yaml.YAMLError:
-        raise ConfigError(f"--set {change}", "the value is not valid YAML") from None
+        value = load_yaml(text)
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        why = getattr(error, "problem", None) or "it is nested too deep, or a date that there is not"
+        raise ConfigError(f"--set {change}", f"the value is not valid YAML: {why}") from None
     if isinstance(value, str):
         with suppress(ValueError):
             return float(value)

@@ -5,14 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import yaml
 from pydantic import ValidationError
 
-from swarmscope.errors import ConfigError, InputFileError, UnknownNameError, nearest_hint
+from swarmscope.errors import ConfigError, UnknownNameError, nearest_hint
 from swarmscope.onboard.planners import load_planner, planner_names
 from swarmscope.scenarios.places import is_packaged
 from swarmscope.scenarios.scenario import Scenario
 from swarmscope.tasks import task_names
+from swarmscope.texts import read_yaml
 from swarmscope.user_files import is_file_name, read_code
 
 REMEDIES = {"place.world.map": ": a map from a file is 'map: {file, starts, goals}' instead of 'place'"}
@@ -42,18 +42,6 @@ def _check_known(kind: str, name: str, names: list[str], where: str) -> None:
         read_code(Path(name))
     elif name not in names:
         raise UnknownNameError(kind, name, names, f"{where}: {kind}.name")
-
-
-def read_yaml(path: Path) -> Any:
-    """Return what a YAML file holds. Errors: InputFileError."""
-    try:
-        return yaml.safe_load(path.read_text(encoding="utf-8"))
-    except UnicodeDecodeError:
-        raise InputFileError(path, "is not text") from None
-    except OSError as error:
-        raise InputFileError(path, f"cannot be read ({error.strerror})") from None
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise InputFileError(path, f"is not YAML ({' '.join(str(error).split())})") from None
 
 
 def read_scenario_file(path: Path) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, Final, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 from swarmscope.onboard.body import Body
 from swarmscope.onboard.lidar import Lidar
@@ -19,12 +19,22 @@ from swarmscope.sim.loop import Setting
 from swarmscope.sim.state import Faults, Noise, Radio
 from swarmscope.sim.world import LONGEST_M, WorldSpec
 
-Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
-Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
-NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
-Angle = Annotated[float, Field(ge=0.0, le=45.0)]
-Rate = Annotated[float, Field(ge=0.0, le=3600.0)]
-Duration = Annotated[float, Field(ge=0.0, le=86400.0)]
+
+def _only_numbers(value: Any) -> Any:
+    """Refuse what Python would take for a number: true is no 1, and text is text."""
+    if isinstance(value, bool | str | bytes):
+        raise ValueError(f"must be a number, not {value!r}" if not isinstance(value, bool) else "must be a number")
+    return value
+
+
+NUMBER: Final = BeforeValidator(_only_numbers)
+Real = Annotated[float, NUMBER]
+Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False), NUMBER]
+Fraction = Annotated[float, Field(ge=0.0, le=1.0), NUMBER]
+NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False), NUMBER]
+Angle = Annotated[float, Field(ge=0.0, le=45.0), NUMBER]
+Rate = Annotated[float, Field(ge=0.0, le=3600.0), NUMBER]
+Duration = Annotated[float, Field(ge=0.0, le=86400.0), NUMBER]
 
 BODY: Final = Body()
 LIDAR: Final = Lidar()
@@ -63,22 +73,22 @@ class RobotModel(_Strict):
 class LidarModel(_Strict):
     """The LiDAR."""
 
-    beams: Annotated[int, Field(ge=8, le=4096)] = LIDAR.beams
+    beams: Annotated[int, Field(ge=8, le=4096), NUMBER] = LIDAR.beams
     """Beams of a scan."""
-    fov_deg: Annotated[float, Field(gt=0.0, le=360.0)] = LIDAR.fov_deg
+    fov_deg: Annotated[float, Field(gt=0.0, le=360.0), NUMBER] = LIDAR.fov_deg
     """Field of view, in the middle of which is straight ahead [°]."""
     range_m: Positive = LIDAR.range_m
     """Longest range; beyond it there is no return [m]."""
     range_min_m: NotNegative = LIDAR.range_min_m
     """Shortest range; a nearer return is invalid and counts as blocked [m]."""
-    rate_hz: Annotated[float, Field(gt=0.0, le=100.0)] = 1.0 / Setting.dt
+    rate_hz: Annotated[float, Field(gt=0.0, le=100.0), NUMBER] = 1.0 / Setting.dt
     """Scans per second; a robot decides once for each scan [Hz]."""
 
 
 class NoiseModel(_Strict):
     """Sensor errors, standard deviations where nothing else is said; 0 is none."""
 
-    range_fraction: Annotated[float, Field(ge=0.0, le=0.3)] = NOISE.range_fraction
+    range_fraction: Annotated[float, Field(ge=0.0, le=0.3), NUMBER] = NOISE.range_fraction
     """Error of a LiDAR range, and of the distance to a neighbour, as a fraction of it."""
     dropout: Fraction = NOISE.dropout
     """Share of LiDAR returns that are lost."""
@@ -88,10 +98,10 @@ class NoiseModel(_Strict):
     """Error of a robot's compass, drawn anew for every scan [°]."""
     compass_bias_deg: Angle = math.degrees(NOISE.compass_bias_rad)
     """Error of a robot's compass that stays the same for the whole run, beside the one drawn for every scan [°]."""
-    odometry_scale: Annotated[float, Field(ge=0.0, le=0.1)] = NOISE.odometry_scale
+    odometry_scale: Annotated[float, Field(ge=0.0, le=0.1), NUMBER] = NOISE.odometry_scale
     """Error of the size of a robot's wheels, the same for the whole run: of its speed and of all motion as it measures
     them, as a fraction; it drives as it wants to."""
-    odometry_drift_m: Annotated[float, Field(ge=0.0, le=1.0)] = NOISE.odometry_drift_m
+    odometry_drift_m: Annotated[float, Field(ge=0.0, le=1.0), NUMBER] = NOISE.odometry_drift_m
     """Error of the place by odometry after 1 m, along and across, a random walk that grows with the root of the way
     [m/√m]."""
     odometry_turn_deg: Angle = math.degrees(NOISE.odometry_turn_rad)
@@ -100,10 +110,10 @@ class NoiseModel(_Strict):
     """Share of LiDAR readings that are broken (NaN), drawn anew for every scan."""
     stuck: Fraction = NOISE.stuck
     """Share of a robot's beams that say the longest range for the whole run, whatever is there."""
-    blind_deg: Annotated[float, Field(ge=0.0, le=360.0)] = math.degrees(NOISE.blind_rad)
+    blind_deg: Annotated[float, Field(ge=0.0, le=360.0), NUMBER] = math.degrees(NOISE.blind_rad)
     """Width of the sector in which a robot's LiDAR finds nothing for the whole run; it lies anywhere in its field of
     view [°]."""
-    scan_age_s: Annotated[float, Field(ge=0.0, le=1.0)] = NOISE.scan_age_s
+    scan_age_s: Annotated[float, Field(ge=0.0, le=1.0), NUMBER] = NOISE.scan_age_s
     """Age of the oldest scan that a robot decides on: each is by a random time below this older than the decision, with
     all that moved and turned since; the guard counts on the oldest [s]."""
 
@@ -158,7 +168,7 @@ class GuardModel(_Strict):
     thinnest_m: NotNegative = GUARDING.thinnest_m
     """Width of the narrowest thing that must not be missed between two beams: robots drive no faster than they can stop
     short of it; 0 asks for nothing [m]."""
-    others_mps: Annotated[float, Field(ge=-1.0, allow_inf_nan=False)] = GUARDING.others_mps
+    others_mps: Annotated[float, Field(ge=-1.0, allow_inf_nan=False), NUMBER] = GUARDING.others_mps
     """How fast others may be; below 0: as fast as these robots, 0: nothing else moves [m/s]."""
     others_yield: bool = GUARDING.others_yield
     """Whether others run the same guard; before those that do not, a robot stands before they can reach it."""
@@ -190,8 +200,8 @@ class TaskModel(_Strict):
     """Options of the task by name; those not given have their defaults."""
 
 
-Metres = Annotated[float, Field(ge=-LONGEST_M, le=LONGEST_M)]
-Heading = Annotated[float, Field(ge=-1000.0, le=1000.0)]
+Metres = Annotated[float, Field(ge=-LONGEST_M, le=LONGEST_M), NUMBER]
+Heading = Annotated[float, Field(ge=-1000.0, le=1000.0), NUMBER]
 MapStart = tuple[Metres, Metres] | tuple[Metres, Metres, Heading] | None
 MapGoal = tuple[Metres, Metres] | None
 
@@ -204,7 +214,7 @@ class MapModel(_Strict):
     ORION's mazes, or the name of a packaged map."""
     resolution_m: Positive | None = None
     """Side of a cell, for files that do not say it: all but map_server's YAML [m]."""
-    number: Annotated[int, Field(ge=0)] | None = None
+    number: Annotated[int, Field(ge=0), NUMBER] | None = None
     """Which of ORION's mazes; its starts and goals are the robots' unless others are given."""
     starts: list[MapStart] = []
     """Where robots start, in the map's coordinates: x, y or x, y, yaw [m, m, rad]; without yaw they look at their goal.
@@ -213,7 +223,7 @@ class MapModel(_Strict):
     """Where robots want to go: x, y [m], in the same way."""
     trips: str | None = None
     """A Moving AI .scen file (looked for beside the scenario, too): starts and goals of its trips."""
-    first_trip: Annotated[int, Field(ge=0)] = 0
+    first_trip: Annotated[int, Field(ge=0), NUMBER] = 0
     """Number of robot 0's trip, 0 is the first; the others have the next ones."""
     min_distance_m: NotNegative | None = None
     """From a start to its goal, where one of them is drawn, at least; null is 8 m, in maps whose free space is shorter
@@ -225,9 +235,9 @@ class WorldModel(_Strict):
 
     world: WorldSpec
     """Bounds and obstacles."""
-    starts: list[tuple[float, float, float]]
+    starts: list[tuple[Real, Real, Real]]
     """Where each robot starts: x, y, yaw [m, m, rad]."""
-    goals: list[tuple[float, float]]
+    goals: list[tuple[Real, Real]]
     """Where each robot wants to go: x, y [m]."""
 
 
@@ -238,7 +248,7 @@ class PlannerModel(_Strict):
     """Name of the planner (``swarmscope planners``)."""
     model: str | None = None
     """Folder of the network that it runs instead of its own; only for planners with a network."""
-    params: dict[str, Annotated[float, Field(allow_inf_nan=False)]] = {}
+    params: dict[str, Annotated[float, Field(allow_inf_nan=False), NUMBER]] = {}
     """Parameters of the planner by name; those not given have their defaults."""
 
 
@@ -253,9 +263,9 @@ class Scenario(_Strict):
     """Instead of ``task``: a world written out."""
     planner: PlannerModel = PlannerModel()
     """Who decides."""
-    robots: Annotated[int, Field(ge=1, le=200_000)] = 15
+    robots: Annotated[int, Field(ge=1, le=200_000), NUMBER] = 15
     """Number of robots."""
-    seed: Annotated[int, Field(ge=0, lt=2**31)] = Setting.seed
+    seed: Annotated[int, Field(ge=0, lt=2**31), NUMBER] = Setting.seed
     """Seed of the world, of all noise and of what planners toss for."""
     robot: RobotModel = RobotModel()
     """The robots' data sheet."""
@@ -273,7 +283,7 @@ class Scenario(_Strict):
     """Which directions are safe."""
     limit_s: Positive = Setting.limit_s
     """Simulated time after which the run ends; it ends earlier when all have arrived or collided [s]."""
-    substeps: Annotated[int, Field(ge=1, le=1000)] = Setting.substeps
+    substeps: Annotated[int, Field(ge=1, le=1000), NUMBER] = Setting.substeps
     """Steps of motion and contact between two scans; more are taken where these leave the arc driven by 0.1 mm."""
     record_scans: Literal["auto", "yes", "no"] = "auto"
     """Keep scans for the replay page; ``auto`` leaves them out where they would be huge."""

@@ -111,6 +111,8 @@ def _require_plain_file(path: Path) -> None:
     try:
         if path.is_dir():
             raise BadFile("is a folder")
+        if not path.is_file() and path.exists():
+            raise BadFile("is no regular file")
         if path.stat().st_size == 0:
             raise BadFile("is empty")
     except OSError as error:

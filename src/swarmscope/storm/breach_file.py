@@ -10,10 +10,11 @@ import yaml
 
 from swarmscope.errors import ConfigError
 from swarmscope.scenarios.overrides import PLACES
-from swarmscope.scenarios.read import parse_scenario, read_yaml
+from swarmscope.scenarios.read import parse_scenario
 from swarmscope.storm.draw import Case
 from swarmscope.storm.forger import KINDS, Forger
 from swarmscope.storm.watch import Breach
+from swarmscope.texts import read_yaml
 
 FIELDS = ("seed", "per_tick", "kinds")
 

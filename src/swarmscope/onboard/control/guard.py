@@ -19,7 +19,7 @@ from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.onboard.control.corners import apart_round, matters_up_to, out_of_hidden_halves
 from swarmscope.onboard.control.halves import in_own_half, met_by
 from swarmscope.onboard.control.horizon import horizon_speed
-from swarmscope.onboard.control.unseen import look_round, out_of_sight
+from swarmscope.onboard.control.unseen import look_round, out_of_sight, reaches_between
 from swarmscope.onboard.control.way import STEPS, Way, closer, shadowed, way_of
 from swarmscope.onboard.percept import MAX_NEIGHBOURS, PEERS, Row
 from swarmscope.onboard.perception.frames import is_blurred
@@ -200,7 +200,8 @@ def _held_by(see: View, v: float, w: float, near: Near) -> int:
             return held
     if rig.sensor.field > 0:
         kept, _ = _kept_from(rig.body.radius_m, bulge, rig)
-        x, y = out_of_sight(see, way, min(kept, near.nearest - 1e-6))
+        front = kept + reaches_between(rig.body.radius_m)
+        x, y = out_of_sight(see, way, min(front, near.nearest - 1e-6))
         if x != 0.0 or y != 0.0:
             see.shared["unseen_left"] = y > 0.0
             return R_HELD_UNSEEN

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from swarmscope._jit import jit, jit_inner
+from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.onboard.control.way import Way, corner_of
 from swarmscope.onboard.perception.frames import in_view, was_free
 from swarmscope.onboard.reasons import R_HELD_UNSEEN
@@ -16,6 +16,8 @@ FRONT_RAD = 1.8
 """The front of the body is looked at up to this angle to either side [rad], ..."""
 GRAIN_M = 0.05
 """... in places so far apart."""
+ROUND_M = 0.05
+"""Radius of the narrowest round thing that must not reach between two of them."""
 
 
 @jit
@@ -35,6 +37,12 @@ def out_of_sight(see: View, way: Way, need: float) -> tuple[float, float]:
                     return x, y
         x0, y0 = x1, y1
     return 0.0, 0.0
+
+
+@jit_inline
+def reaches_between(radius: float) -> float:
+    """Return how far a round thing of `ROUND_M` gets between two places on the front of a body of ``radius`` [m]."""
+    return 0.125 * GRAIN_M * GRAIN_M * (1.0 / radius + 1.0 / ROUND_M)
 
 
 @jit

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import ValidationError
 
-from swarmscope.errors import ConfigError, InputFileError
+from swarmscope.errors import ConfigError
 from swarmscope.sim.world import Grid, grid_from_solid
 
 MOST_CELLS = 40_000_000
@@ -16,14 +16,6 @@ MOST_CELLS = 40_000_000
 it is read."""
 MOST_RUNS = 2_000_000
 """Its rows hold at most so many solid pieces: a photograph has more."""
-
-
-def read_text(path: Path) -> str:
-    """Return the text of a file, without a byte order mark. Errors: InputFileError."""
-    try:
-        return path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputFileError(path, f"cannot be read: {error}") from error
 
 
 def check_size(path: Path, width: int, height: int) -> None:

@@ -10,9 +10,10 @@ import numpy as np
 import yaml
 
 from swarmscope.errors import ConfigError, InputFileError
-from swarmscope.sim.maps.files import as_grid, read_text
+from swarmscope.sim.maps.files import as_grid
 from swarmscope.sim.maps.picture import MODES, Reading, free_cells
 from swarmscope.sim.world import Grid, grid_from_solid, solid_from_grid
+from swarmscope.texts import read_yaml
 
 FREE_GREY, SOLID_GREY = 254, 0
 
@@ -87,10 +88,7 @@ def save_map(grid: Grid, yaml_path: str | Path) -> None:
 
 
 def _read_yaml(path: Path) -> dict[str, Any]:
-    try:
-        settings = yaml.safe_load(read_text(path))
-    except (yaml.YAMLError, ValueError) as error:
-        raise InputFileError(path, f"is not YAML: {error}") from error
+    settings = read_yaml(path)
     if not isinstance(settings, dict):
         raise InputFileError(path, "is not a map description: expected 'key: value' lines")
     return settings

@@ -8,8 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from swarmscope.errors import ConfigError, InputFileError
-from swarmscope.sim.maps.files import as_grid, check_size, read_text
+from swarmscope.sim.maps.files import as_grid, check_size
 from swarmscope.sim.world import Grid
+from swarmscope.texts import read_text
 
 MOVINGAI_FREE, MOVINGAI_BLOCKED = ".GS", "@OTW"
 

@@ -13,8 +13,10 @@ from PIL import Image
 
 from swarmscope.errors import InputFileError
 from swarmscope.sim.maps.files import check_size
+from swarmscope.texts import check_regular
 
 ROWS_AT_ONCE = 512
+MOST_BYTES = 1 << 30
 FULL_16 = 65535.0
 FULL_8 = 255.0
 FREE_RAW = 0.0
@@ -40,6 +42,7 @@ def free_cells(path: Path, reading: Reading) -> npt.NDArray[np.bool_]:
     takes the brightness for the cell's value, 0 is free, 1 to 100 more or less occupied, more unknown.
     Errors: InputFileError, ConfigError for a picture that is too large.
     """
+    check_regular(path, MOST_BYTES)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # there is a limit of our own
@@ -47,8 +50,6 @@ def free_cells(path: Path, reading: Reading) -> npt.NDArray[np.bool_]:
                 check_size(path, *image.size)
                 image.load()
                 return np.concatenate([_is_free(values, full, reading) for values, full in _strips(image)])
-    except FileNotFoundError:
-        raise InputFileError(path, "there is no such picture") from None
     except Image.DecompressionBombError:
         raise InputFileError(path, "is far too large a picture") from None
     except (OSError, ValueError, SyntaxError, EOFError, MemoryError) as error:
