@@ -170,7 +170,7 @@ WRONG = {
     "infinite parameter": (["--set", "planner.params.w_i=.inf"], ["planner.params.w_i", "finite"]),
     "key": (["--set", "radio.los=1"], ["radio.los", "unknown key", "did you mean 'loss'"]),
     "group": (["--set", "planer.name=x"], ["planer", "did you mean 'planner'"]),
-    "value": (["--set", "radio.loss=a lot"], ["radio.loss", "valid number"]),
+    "value": (["--set", "radio.loss=a lot"], ["radio.loss", "must be a number"]),
     "range": (["--set", "radio.loss=1.5"], ["radio.loss", "less than or equal to 1"]),
     "path into a value": (["--seed", "1", "--set", "seed.x=1"], ["--set seed.x=1", "'seed' is not a group"]),
     "no equals": (["--set", "radio"], ["--set radio", "key.path=value"]),
