@@ -13,8 +13,11 @@ from swarmscope.errors import InputFileError
 MOST_BYTES = 64 << 20
 
 
-def check_regular(path: Path, most_bytes: int = MOST_BYTES) -> None:
-    """Raise an InputFileError for what is no regular file (a pipe or a device may never end), or too large a one."""
+def check_regular(path: Path, most_bytes: int | None = MOST_BYTES) -> None:
+    """Raise an InputFileError for what is no regular file (a pipe or a device may never end), or too large a one.
+
+    With ``most_bytes`` None it may be of any size.
+    """
     try:
         found = path.stat()
     except (OSError, ValueError) as error:
@@ -23,7 +26,7 @@ def check_regular(path: Path, most_bytes: int = MOST_BYTES) -> None:
         raise InputFileError(path, "is a folder")
     if not stat.S_ISREG(found.st_mode):
         raise InputFileError(path, "is no regular file")
-    if found.st_size > most_bytes:
+    if most_bytes is not None and found.st_size > most_bytes:
         raise InputFileError(path, f"is larger than {most_bytes >> 20} MiB")
 
 

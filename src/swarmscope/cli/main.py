@@ -130,10 +130,10 @@ def run(
     """Run one scenario to a folder: metrics, trajectory, world, a picture, a replay page."""
     from swarmscope.cli.run import run_command
 
+    place: dict[str, Any] = {"resolution_m": resolution, "number": number, "trips": trips, "first_trip": first_trip}
+    place |= {"starts": start, "goals": goal}
     options: dict[str, Any] = {"robots": robots, "seed": seed, "limit_s": limit}
-    options |= {"map.resolution_m": resolution, "map.trips": trips, "map.first_trip": first_trip}
-    options |= {"map.number": number}
-    options |= {"map.starts": start, "map.goals": goal}
+    options |= {f"map.{key}": value for key, value in place.items()}
     run_command(scenario, task, map_, planner, options, set_ or [], out, threads, pictures, not no_code, force)
 
 

@@ -60,7 +60,7 @@ def _print_table(log: ScanLog, seen: Perception) -> None:
     if seen.masked:
         table.add_row("beams that see the robot itself", f"{seen.masked}, bridged")
     if seen.below.any():
-        words = f"{seen.below.mean():.1f} of {beams}, wide holes block (--no-return {0:g}: they are none)"
+        words = f"{seen.below.mean():.1f} of {beams}, wide holes block (--no-return 0: they are none)"
         table.add_row("below the shortest range, mean per scan", words)
     broken = seen.broken - seen.below - seen.masked
     if (broken > 0).any():

@@ -9,6 +9,7 @@ import numpy as np
 
 from swarmscope.errors import ConfigError
 from swarmscope.sim.maps import Trip, closed, load_map, load_movingai, load_trips, packaged_map
+from swarmscope.sim.maps.map_server import YAML
 from swarmscope.sim.maps.movingai import place_of
 from swarmscope.sim.maps.orion import load_maze
 from swarmscope.sim.world import Grid, WorldSpec, grid_corners
@@ -17,8 +18,6 @@ from swarmscope.tasks._check import Keeping, check_keeping
 
 if TYPE_CHECKING:  # what a scenario says elsewhere changes no place
     from swarmscope.scenarios.scenario import MapModel, Scenario
-
-YAML = (".yaml", ".yml")
 
 
 def make_setup(scenario: Scenario) -> Setup:

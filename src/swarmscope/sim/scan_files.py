@@ -29,6 +29,7 @@ import numpy.typing as npt
 
 from swarmscope.errors import InputFileError, UnknownNameError
 from swarmscope.sim.scan_tables import HEADER_KEYS, BadFile, arrays_from_text
+from swarmscope.texts import check_regular, read_text
 
 MAX_BYTES = 1 << 30
 NO_RETURN_CM = 65535
@@ -75,7 +76,7 @@ def scan_file(name: str) -> Path:
 def load_scans(path: str | Path) -> ScanLog:
     """Read recorded scans; any file that is not sound raises ``InputFileError`` with the reason."""
     path = Path(path)
-    readers = {".npz": _arrays_from_npz} | dict.fromkeys((".csv", ".txt", ".log", ".clf"), _arrays_from_csv)
+    readers = {".npz": _arrays_from_npz} | dict.fromkeys((".csv", ".txt", ".log", ".clf"), _arrays_from_table)
     reader = readers.get(path.suffix.lower())
     if reader is None:
         raise InputFileError(path, f"scans come as {', '.join(readers)}, not '{path.suffix}'")
@@ -94,7 +95,9 @@ def read_npz(path: Path) -> dict[str, npt.NDArray[Any]]:
 
 
 def _arrays_from_npz(path: Path) -> dict[str, npt.NDArray[Any]]:
-    _require_plain_file(path)
+    check_regular(path, None)
+    if path.stat().st_size == 0:
+        raise BadFile("is empty")
     try:
         _require_bounded_zip(path)
         with np.load(path, allow_pickle=False) as archive:
@@ -105,18 +108,6 @@ def _arrays_from_npz(path: Path) -> dict[str, npt.NDArray[Any]]:
         raise BadFile("claims more data than fits into memory: torn or foreign") from None
     except Exception as error:  # damaged archives make zipfile, zlib and numpy raise a dozen unrelated types
         raise BadFile(f"torn or foreign .npz ({_first_line(error)})") from None
-
-
-def _require_plain_file(path: Path) -> None:
-    try:
-        if path.is_dir():
-            raise BadFile("is a folder")
-        if not path.is_file() and path.exists():
-            raise BadFile("is no regular file")
-        if path.stat().st_size == 0:
-            raise BadFile("is empty")
-    except OSError as error:
-        raise BadFile(error.strerror or "cannot be read") from None
 
 
 def _require_bounded_zip(path: Path) -> None:
@@ -130,16 +121,10 @@ def _first_line(error: Exception) -> str:
     return (str(error).splitlines() or [type(error).__name__])[0]
 
 
-def _arrays_from_csv(path: Path) -> dict[str, npt.NDArray[Any]]:
-    _require_plain_file(path)
-    try:
-        if path.stat().st_size > MAX_BYTES:
-            raise BadFile(f"is larger than {MAX_BYTES >> 20} MiB")
-        text = path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise BadFile(error.strerror or "cannot be read") from None
-    except UnicodeDecodeError:
-        raise BadFile("is not text") from None
+def _arrays_from_table(path: Path) -> dict[str, npt.NDArray[Any]]:
+    text = read_text(path, MAX_BYTES)
+    if not text:
+        raise BadFile("is empty")
     if not text.endswith("\n"):
         raise BadFile("the last line is not ended: torn (if it is complete, end it with a newline)")
     return arrays_from_text(text)

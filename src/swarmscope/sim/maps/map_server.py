@@ -15,20 +15,22 @@ from swarmscope.sim.maps.picture import MODES, Reading, free_cells
 from swarmscope.sim.world import Grid, grid_from_solid, solid_from_grid
 from swarmscope.texts import read_yaml
 
+YAML = (".yaml", ".yml")
+"""Ends of the names of map descriptions; any other file is a picture."""
 FREE_GREY, SOLID_GREY = 254, 0
 
 
 def load_map(path: str | Path, resolution: float | None = None) -> Grid:
-    """Read a map_server / nav2 map, or a picture with cells of ``resolution`` [m]; its first row is the top.
+    """Read a map_server / nav2 map, or a picture alone with cells of ``resolution`` [m]; its first row is the top.
 
     `picture.free_cells` says which cells are free; all others are solid. A rotated origin turns the grid. A picture
     alone has its lower left corner at (0, 0) and map_server's usual thresholds. Errors: InputFileError, ConfigError.
     """
     path = Path(path)
-    if path.suffix.lower() not in (".yaml", ".yml"):
+    if path.suffix.lower() not in YAML:
         return _picture_alone(path, resolution)
     settings = _read_yaml(path)
-    side = _number(path, settings, "resolution") if resolution is None else resolution
+    side = _number(path, settings, "resolution")
     if side <= 0.0:
         raise ConfigError(f"{path}: resolution", f"must be above 0, got {side}")
     x, y, yaw = _origin(path, settings)
