@@ -100,7 +100,8 @@ class Run:
 
     def _shortest_m(self) -> np.ndarray:
         """Return the shortest ways (N,): true ones, A* on the grid where those were not found."""
-        found = self._references or reference_ways(_setup_of(self.world), self.world["robots"][0]["radius"])
+        radii = [robot["radius"] for robot in self.world["robots"]]
+        found = self._references or reference_ways(_setup_of(self.world), radii)
         self._references = found
         exact = np.isfinite(found.any_angle_m).any()
         return found.any_angle_m if exact else found.shortest_m

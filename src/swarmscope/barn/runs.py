@@ -160,4 +160,4 @@ def _shortest_m(scenario: Scenario) -> float:
         setup = make_setup(scenario)
     except UnsolvableWorldError:
         return math.nan
-    return float(lengths_m(any_angle_paths(setup.world, setup.starts, setup.goals, scenario.robot.radius_m))[0])
+    return float(lengths_m(any_angle_paths(setup.world, setup.starts, setup.goals, scenario.widest.radius_m))[0])

@@ -122,7 +122,7 @@ def world_key(scenario: Scenario) -> str:
     task = code_files(None, _name_of("task", config))
     code = state_of(union_of([Path(str(places.__file__)), Path(str(references.__file__)), *task]))
     numbers = {name: installed_version(name) for name in ("numpy", "numba")}
-    values = {"place": _without_folders(config), "radius": scenario.robot.radius_m, "code": code}
+    values = {"place": _without_folders(config), "radius": scenario.radii_m, "code": code}
     return _hash(values | {"versions": numbers})
 
 

@@ -52,6 +52,7 @@ COUNTED: list[Metric] = [
     Metric("sides_judged", "", "neither", "choices of a side where the shortest way has one, all robots"),
     Metric("planning_failures", "", "lower", "robots that did not arrive in time (N_a)"),
     Metric("collisions", "", "lower", "robots that touched something"),
+    Metric("walked_into", "", "lower", "times that a disc on its way walked into a robot that stood"),
     Metric("min_clearance_m", "m", "higher", "smallest distance of any robot to anything"),
     Metric("fusions", "", "neither", "choices of a side, all robots (N_u)"),
     Metric("messages", "", "lower", "packets sent, all robots"),

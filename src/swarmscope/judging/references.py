@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -27,8 +28,12 @@ class References(NamedTuple):
     """How long they took to find (measured)."""
 
 
-def reference_ways(setup: Setup, radius: float, any_angle: bool = True) -> References:
-    """Find the shortest ways of robots of ``radius`` [m]."""
+def reference_ways(setup: Setup, radius: float | Sequence[float], any_angle: bool = True) -> References:
+    """Find the shortest ways of robots of ``radius`` [m], of all or of each."""
+    radii = np.broadcast_to(np.asarray(radius, float), len(setup.starts))
+    if radii.max() > radii.min():
+        return _of_each_size(setup, radii, any_angle)
+    radius = float(radii[0])
     robots = len(setup.starts)
     begun = time.perf_counter()
     chosen = _with_reference(setup)
@@ -38,6 +43,17 @@ def reference_ways(setup: Setup, radius: float, any_angle: bool = True) -> Refer
     shortest[chosen] = lengths_m(ways)
     if any_angle and len(chosen) == robots <= ANY_ANGLE_ROBOTS:
         best = lengths_m(any_angle_paths(setup.world, setup.starts, setup.goals, radius, ways))
+    return References(shortest, best, wall_s)
+
+
+def _of_each_size(setup: Setup, radii: np.ndarray, any_angle: bool) -> References:
+    """Find the shortest ways of robots of several ``radii`` (N,) [m]."""
+    shortest, best, wall_s = *np.full((2, len(radii)), np.nan), 0.0
+    for radius in np.unique(radii).tolist():
+        alike = np.flatnonzero(radii == radius)
+        found = reference_ways(Setup(setup.world, setup.starts[alike], setup.goals[alike]), radius, any_angle)
+        shortest[alike], best[alike] = found.shortest_m, found.any_angle_m
+        wall_s += found.wall_s
     return References(shortest, best, wall_s)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -84,7 +85,7 @@ def play(
         setting = replace(setting, advice=make_advice(setup, *judged_by(scenario, setting.rig)))
     trace = run(setting, progress)
     if references is None:
-        references = reference_ways(setup, scenario.robot.radius_m, any_angle)
+        references = reference_ways(setup, scenario.radii_m, any_angle)
     return Outcome(scenario, setup, setting, trace, references)
 
 
@@ -142,6 +143,7 @@ def figures(outcome: Outcome) -> dict[str, Any]:
         "reference_robots": int(np.isfinite(outcome.references.shortest_m).sum()),
         "planning_failures": int((~np.isfinite(robots["arrival_s"])).sum()),
         "collisions": int(robots["crashed"].sum()),
+        **({"walked_into": int(robots["touched"].sum())} if outcome.setting.moving.radius.size else {}),
         "min_clearance_m": float(robots["min_clearance"].min()),
         "fusions": int(robots["fusions"].sum()),
         "messages": int(robots["sent"].sum()),
@@ -206,12 +208,14 @@ def failures(outcome: Outcome) -> list[dict[str, Any]]:
 
 def world_table(outcome: Outcome) -> dict[str, Any]:
     """Return ``world.json``: robots, starts, goals and every obstacle."""
-    spec = outcome.setup.world.model_dump(mode="json")
-    radius = outcome.scenario.robot.radius_m
-    robots = [
-        {"id": i, "radius": radius, "start": start.tolist(), "goal": goal.tolist()}
-        for i, (start, goal) in enumerate(zip(outcome.setup.starts, outcome.setup.goals, strict=True))
+    spec = outcome.setup.world.model_dump(mode="json", exclude_none=True)
+    setup, sheets = outcome.setup, outcome.scenario.sheets
+    robots: list[dict[str, Any]] = [
+        {"id": i, "radius": sheet.radius_m, "start": start.tolist(), "goal": goal.tolist()}
+        for i, (sheet, start, goal) in enumerate(zip(sheets, setup.starts, setup.goals, strict=True))
     ]
+    for robot, yaw in zip(robots, [] if setup.goal_yaws is None else setup.goal_yaws.tolist(), strict=False):
+        robot |= {"goal_yaw": yaw} if math.isfinite(yaw) else {}
     return {"frame": "map, x east, y north, m and rad (REP-103)", "robots": robots, **spec}
 
 

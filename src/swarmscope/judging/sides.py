@@ -28,7 +28,7 @@ def judged_by(scenario: Scenario, rig: Rig) -> tuple[float, float]:
     The first is the robot's radius and margin; the second its own horizon, from its centre on.
     """
     horizon_m = max(rig.look_ahead, rig.protection.l_th) + rig.body.radius_m
-    return scenario.robot.radius_m + scenario.safety.margin_m, horizon_m
+    return scenario.widest.radius_m + scenario.safety.margin_m, horizon_m
 
 
 def make_advice(setup: Setup, radius: float, horizon_m: float = math.inf, resolution: float = RESOLUTION_M) -> Advice:

@@ -113,15 +113,24 @@ def check_horizon(rig: Rig, dt_s: float) -> None:
     come into view.
     """
     guarding, taken = rig.guarding, rig.body.radius_m + rig.guarding.clearance_m
+    if guarding.strangers_mps > 0.0 and rig.sensor.field > 0:
+        raise ConfigError(
+            "guard.strangers_mps", "somebody may come from where this LiDAR does not look: lidar.fov_deg 360 would do"
+        )
     speed = min(SLOWEST_MPS, rig.body.v_max_mps)
     delay, brake = dt_s + guarding.latency_s, speed * speed / (2.0 * rig.body.a_max_mps2)
     _check_view(rig, speed, taken + speed * delay + brake, "things", guarding.thinnest_m, 0.0)
+    if guarding.strangers_mps > 0.0:
+        gap = speed * delay + brake + guarding.strangers_mps * (delay + speed / rig.body.a_max_mps2)
+        smallest = guarding.strangers_m
+        _check_view(rig, speed, taken + gap, "people", 2.0 * smallest, smallest)
     if not guarding.others_mps > 0.0:
         return
     gap = 2.0 * (speed * delay + 2.0 * brake)
     if not guarding.others_yield:
         gap = speed * delay + brake + guarding.others_mps * (delay + speed / rig.body.a_max_mps2)
-    _check_view(rig, speed, taken + gap, "robots", 2.0 * rig.body.radius_m, rig.body.radius_m)
+    smallest = guarding.others_smallest_m
+    _check_view(rig, speed, taken + gap, "robots", 2.0 * smallest, smallest)
 
 
 def _check_view(rig: Rig, speed: float, need: float, what: str, width: float, nearer: float) -> None:

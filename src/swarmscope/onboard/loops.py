@@ -12,6 +12,7 @@ import numpy as np
 
 from swarmscope._jit import jit_for
 from swarmscope.held import Held
+from swarmscope.onboard.control.arriving import turn_at_goal
 from swarmscope.onboard.control.guard import guard
 from swarmscope.onboard.tick import guard_all, perceive, perceive_all
 from swarmscope.onboard.view import Swarm, python_view, view_of
@@ -34,7 +35,8 @@ def compiled_step(decide: Callable[..., None], module: ModuleType) -> Step:
     file, so that it is compiled anew when that file has changed.
     """
     name = f"step_{module.__name__.rpartition('.')[2]}"
-    names = {"view_of": view_of, "perceive": perceive, "decide": decide, "guard": guard, "range": range}
+    names: dict[str, Any] = {"view_of": view_of, "perceive": perceive, "decide": decide}
+    names |= {"turn_at_goal": turn_at_goal, "guard": guard, "range": range}
     place = decide.py_func.__code__  # type: ignore[attr-defined]
     code = _each.__code__.replace(co_name=name, co_filename=place.co_filename, co_firstlineno=place.co_firstlineno)
     loop = FunctionType(code, names, name)
@@ -49,6 +51,7 @@ def _each(first: int, last: int, held: Held[Swarm], memories: np.ndarray, params
         see = view_of(swarm, i)
         perceive(see, still_s)
         decide(see, memories[i], params)  # type: ignore[name-defined]  # noqa: F821
+        turn_at_goal(see)
         guard(see)
 
 

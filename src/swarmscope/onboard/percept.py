@@ -31,6 +31,7 @@ PERCEPT = np.dtype(
         ("dt_s", np.float64),  # time until the next tick [s]
         ("goal_bearing", np.float64),  # of the goal, body frame [rad]
         ("goal_distance", np.float64),  # [m]
+        ("goal_turn", np.float64),  # heading wanted at the goal, body frame [rad]; NaN: any
         ("speed", np.float64),  # forward, by wheel encoders [m/s]
         ("odom_x", np.float64),  # motion since the last tick, in the body frame of the last tick [m]
         ("odom_y", np.float64),
@@ -87,6 +88,7 @@ SHARED = np.dtype(
         ("track_y", np.float64, PEERS),
         ("track_was_x", np.float32, PEERS),  # where it was a tick ago, seen from here
         ("track_was_y", np.float32, PEERS),
+        ("track_radius", np.float64, PEERS),  # of its body at most
         ("track_vx", np.float64, PEERS),
         ("track_vy", np.float64, PEERS),
         ("track_yaw", np.float64, PEERS),  # compass frame [rad]
@@ -95,6 +97,8 @@ SHARED = np.dtype(
         ("track_anchor_x", np.float64, PEERS),  # where it was when it last moved, own odometry frame [m]
         ("track_anchor_y", np.float64, PEERS),
         ("track_moved_s", np.float64, PEERS),  # when it last moved
+        ("past_n", np.uint8),  # scans that tell what moves (``perception/standing.py``)
+        ("past_at", np.uint8),  # the newest of them
         # newest features heard of each peer, compass frame
         ("heard_id", np.int64, PEERS),  # -1 = free
         ("heard_s", np.float64, PEERS),  # when the request that it answers was sent

@@ -47,6 +47,14 @@ class Guarding(NamedTuple):
     """How fast others may be; below 0: as fast as this robot; 0: nothing else moves."""
     others_yield: bool = True
     """Whether others run the same guard."""
+    others_smallest_m: float = -1.0
+    """Radius of the smallest of them; below 0, or above this robot's own: that."""
+    others_largest_m: float = -1.0
+    """Radius of the largest; below 0: this robot's."""
+    strangers_mps: float = -1.0
+    """How fast those are that are no robots and do not yield, people; 0 and below: there are none."""
+    strangers_m: float = -1.0
+    """Radius of the smallest of them; below 0: `STRANGERS_M`."""
 
 
 class Safety(NamedTuple):
@@ -74,6 +82,8 @@ class Sharing(NamedTuple):
     """Features older than this are not used."""
 
 
+STRANGERS_M = 0.2
+"""Radius of a slim person [m]."""
 SIGMAS = 3.0
 """Ranges and odometry may err by so many standard deviations."""
 MOST_LEVELS = 32
@@ -136,6 +146,7 @@ def make_rig(
     beside = keeps_beside(body, sensor)
     footprint = max(body.radius_m + guarding.footprint_clearance_m, beside)
     half = window_half(protection.alpha, sensor.increment)
+    resolved = _resolved(guarding, body)
     slower = _slower(body, safety)
     levels = [protection_model(one) for one in slower]
     reach = [
@@ -150,8 +161,8 @@ def make_rig(
         sensor=sensor,
         half=half,
         footprint=footprint,
-        horizon=horizon_of(body, sensor, guarding.thinnest_m),
-        guarding=_resolved(guarding, body),
+        horizon=horizon_of(resolved.others_smallest_m, resolved.strangers_m, sensor, guarding.thinnest_m),
+        guarding=resolved,
         sharing=Sharing(bool(sharing.exact_features), float(sharing.max_age_s)),
         look_ahead=float(safety.look_ahead_m),
         reach=np.array(reach),
@@ -190,10 +201,14 @@ def _slower(body: Body, safety: Safety) -> list[Body]:
 
 
 def _resolved(guarding: Guarding, body: Body) -> Guarding:
-    """Return plain numbers, the speed of others filled in."""
-    others = guarding.others_mps if guarding.others_mps >= 0.0 else body.v_max_mps
-    lengths = (float(value) for value in guarding[:-2])
-    return Guarding(*lengths, float(others), bool(guarding.others_yield))  # type: ignore[call-arg, arg-type]
+    """Return plain numbers, what is not said of others filled in."""
+    own = {"others_mps": body.v_max_mps, "others_smallest_m": body.radius_m, "others_largest_m": body.radius_m}
+    own |= {"strangers_mps": 0.0, "strangers_m": STRANGERS_M}
+    given = {name: float(value) for name, value in guarding._asdict().items() if name != "others_yield"}
+    filled = given | {name: value for name, value in own.items() if not given[name] >= 0.0}
+    filled["others_smallest_m"] = min(filled["others_smallest_m"], body.radius_m)
+    filled["others_largest_m"] = max(filled["others_largest_m"], filled["others_smallest_m"])
+    return Guarding(**filled, others_yield=bool(guarding.others_yield))
 
 
 def keeps_beside(body: Body, sensor: Sensor) -> float:

@@ -142,7 +142,7 @@ class Robot:
         *,
         scan: Any,
         now_s: float,
-        goal: tuple[float, float] | None,
+        goal: tuple[float, float] | tuple[float, float, float] | None,
         heading: float,
         speed: float,
         moved: tuple[float, float, float],
@@ -154,9 +154,9 @@ class Robot:
 
         ``scan`` (B,) [m] is a scan as the data sheet says, or what looks like a ROS LaserScan; None = no new one, the
         last is moved on. ``scan_s`` is its own stamp on the clock of ``now_s`` [s]. ``goal`` is (bearing [rad],
-        distance [m]) and ``moved`` (dx, dy [m], dyaw [rad]) since the last tick, in the body frame of now and of the
-        last tick; ``heading`` [rad] is by compass, 0 = east; ``speed`` [m/s] by the wheels. ``neighbours`` are
-        ``Seen``, ``inbox`` the packets that came in.
+        distance [m]), or with the heading wanted there as a third [rad], in the body frame of now; ``moved`` (dx, dy
+        [m], dyaw [rad]) since the last tick, in that of the last tick; ``heading`` [rad] is by compass, 0 = east;
+        ``speed`` [m/s] by the wheels. ``neighbours`` are ``Seen``, ``inbox`` the packets that came in.
         """
         try:
             self._mail.put(inbox, self.faults)
@@ -226,13 +226,16 @@ class Robot:
         """Check and set goal, heading and speed; raises Unusable."""
         if goal is None:
             raise Unusable("no goal", "there is no goal")
-        bearing, distance = numbers(goal, 2, "goal", "goal must be (bearing [rad], distance [m])")
+        bearing, distance, *turn = numbers(
+            goal, _count(goal), "goal", "goal must be (bearing [rad], distance [m]) or (bearing, distance, turn [rad])"
+        )
         if not 0.0 <= distance <= GOAL_M:
             raise Unusable("goal", f"the goal is {distance:g} m away")
         compass = one_number(heading, "heading", "heading must be an angle [rad]")
         wheels = one_number(speed, "speed", "speed must be a number [m/s]")
         if abs(wheels) > fastest(self.body.v_max_mps):
             raise Unusable("speed", f"{wheels:g} m/s is no speed of this body")
+        self.rows.fill(goal_turn=angle(turn[0]) if turn else math.nan)
         self.rows.fill(goal_bearing=angle(bearing), goal_distance=distance, compass=angle(compass), speed=wheels)
 
     def _decide(self) -> Command:
@@ -268,3 +271,11 @@ def _place(error: Exception) -> str:
     while trace is not None and trace.tb_next is not None:
         trace = trace.tb_next
     return "?" if trace is None else f"{Path(trace.tb_frame.f_code.co_filename).name}:{trace.tb_lineno}"
+
+
+def _count(goal: Any) -> int:
+    """Return how many numbers a goal has: 3 with a heading."""
+    try:
+        return 3 if len(goal) == 3 else 2
+    except TypeError:
+        return 2

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from swarmscope._jit import jit, jit_inline, jit_paste
 from swarmscope.held import Held
+from swarmscope.onboard.control.arriving import turn_at_goal
 from swarmscope.onboard.control.guard import guard
 from swarmscope.onboard.perception.bearings import steady
 from swarmscope.onboard.perception.clock import keep_time
@@ -18,9 +19,10 @@ from swarmscope.onboard.perception.lost import keep_lost
 from swarmscope.onboard.perception.mend import mend
 from swarmscope.onboard.perception.reproject import move_on
 from swarmscope.onboard.perception.safety import safe_directions
+from swarmscope.onboard.perception.standing import tell_standing
 from swarmscope.onboard.rig import AHEAD, PRINTED
 from swarmscope.onboard.sharing.inbox import answer_all, read_inbox
-from swarmscope.onboard.sharing.tracks import mask_moving_neighbours, update_odometry, update_tracks
+from swarmscope.onboard.sharing.tracks import mask_moving_neighbours, measure_bodies, update_odometry, update_tracks
 from swarmscope.onboard.view import Swarm, View, view_of
 
 
@@ -45,6 +47,9 @@ def perceive(see: View, still_s: float) -> None:
     if see.rig.sensor.field > 0:
         keep_frame(see)
     keep_lost(see, broken)
+    if see.rig.guarding.strangers_mps > 0.0:
+        tell_standing(see)
+    measure_bodies(see)
     mask_moving_neighbours(see, still_s)
     safe_directions(see.masked, see.rig.sensor, see.reach[AHEAD], see.edges, see.safe)
 
@@ -92,7 +97,9 @@ def perceive_all(first: int, last: int, held: Held[Swarm], still_s: float) -> No
 
 @jit
 def guard_all(first: int, last: int, held: Held[Swarm]) -> None:
-    """Let the guard have the last word on the commands of robots ``first`` to ``last - 1``."""
+    """Let robots ``first`` to ``last - 1`` turn at their goals, and the guard have the last word on their commands."""
     swarm = held.what
     for i in range(first, last):
-        guard(view_of(swarm, i))
+        see = view_of(swarm, i)
+        turn_at_goal(see)
+        guard(see)

@@ -24,6 +24,8 @@ GUARD_ALONE = 128
 sees: planners would give every edge a wider berth."""
 BROKEN = 64
 """Added to ``View.unseen`` where the beam is broken and what stands there is bridged."""
+PAST_SCANS = 3
+"""Scans that tell what moves."""
 POSE = 5
 """Numbers that say where a scan was taken."""
 
@@ -44,6 +46,17 @@ class Frames(NamedTuple):
     """(K, 5): where each was taken, x, y [m], yaw [rad], body frame of now; way [m] and turning [rad] since then."""
 
 
+class Past(NamedTuple):
+    """Scans of the last second, where somebody may come who does not yield (``perception/standing.py``)."""
+
+    scans: np.ndarray
+    """(K, M) float32 [m]."""
+    poses: np.ndarray
+    """(K, 5): as in `Frames`."""
+    at_s: np.ndarray
+    """(K,): when each was taken, by the robot's own clock [s]."""
+
+
 class View(NamedTuple):
     """What one robot has in one tick. M beams."""
 
@@ -57,6 +70,9 @@ class View(NamedTuple):
     misses: np.ndarray
     """(M,) uint8: how often each beam has missed what the beams beside it saw, since it last saw something."""
     frames: Frames
+    past: Past
+    standing: np.ndarray
+    """(M,) uint8: whether what a beam sees stands, where it matters; (0,) where nobody comes who does not yield."""
     masked: np.ndarray
     """(M,) float32: the scan without moving neighbours."""
     safe: np.ndarray
@@ -96,6 +112,8 @@ class Swarm(NamedTuple):
     unseen: np.ndarray
     misses: np.ndarray
     frames: Frames
+    past: Past
+    standing: np.ndarray
     masked: np.ndarray
     safe: np.ndarray
     own: Table
@@ -115,19 +133,28 @@ def _table(robots: int) -> Table:
     return Table(np.zeros((robots, MAX_FEATURES)), np.zeros((robots, MAX_FEATURES)))
 
 
+def _past(robots: int, beams: int, kept: int) -> Past:
+    scans = np.zeros((robots, kept, beams), np.float32)
+    return Past(scans, np.zeros((robots, kept, POSE)), np.zeros((robots, kept)))
+
+
 def new_swarm(robots: int, rig: Rig) -> Swarm:
     """Return the rows of ``robots`` robots that have seen nothing yet, their addresses 0, 1, ..."""
     beams = rig.sensor.beams
     field = rig.sensor.field
     frames = max(FEWEST_FRAMES, math.ceil(FRAMES_PER_TURN * beams / field)) if field else 0
+    kept = PAST_SCANS if rig.guarding.strangers_mps > 0.0 else 0
     percepts, decisions = np.zeros(robots, PERCEPT), np.zeros(robots, DECISION)
     percepts["id"] = np.arange(robots)
+    percepts["goal_turn"] = np.nan
     decisions["p_self"] = decisions["p_left"] = np.nan
     return Swarm(
         scans=np.full((robots, beams), np.inf, np.float32),
         kept=np.zeros((robots, beams), np.float32),
         unseen=np.zeros((robots, beams), np.uint8),
         misses=np.zeros((robots, beams), np.uint8),
+        past=_past(robots, beams, kept),
+        standing=np.zeros((robots, beams if kept else 0), np.uint8),
         frames=Frames(np.zeros((robots, frames, field), np.float32), np.zeros((robots, frames, POSE))),
         masked=np.zeros((robots, beams), np.float32),
         safe=np.zeros((robots, beams), np.uint8),
@@ -155,6 +182,8 @@ def view_of(swarm: Swarm, i: int) -> View:
         swarm.unseen[i],
         swarm.misses[i],
         Frames(swarm.frames.scans[i], swarm.frames.poses[i]),
+        Past(swarm.past.scans[i], swarm.past.poses[i], swarm.past.at_s[i]),
+        swarm.standing[i],
         swarm.masked[i],
         swarm.safe[i],
         Table(swarm.own.angles[i], swarm.own.distances[i]),
@@ -183,7 +212,7 @@ def arrays_of(swarm: Swarm) -> list[np.ndarray]:
     """Return every array of a swarm's robots, a row each."""
     found: list[np.ndarray] = []
     for part in swarm:
-        if isinstance(part, Table | Frames):
+        if isinstance(part, Table | Frames | Past):
             found += part
         elif isinstance(part, np.ndarray):
             found.append(part)

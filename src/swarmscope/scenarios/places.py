@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,7 +23,7 @@ if TYPE_CHECKING:  # what a scenario says elsewhere changes no place
 
 def make_setup(scenario: Scenario) -> Setup:
     """Return world, starts and goals of the scenario, checked to be solvable for robots as it describes them."""
-    radius = scenario.robot.radius_m
+    radius: float | list[float] = scenario.radii_m
     guard = scenario.guard
     keeping = Keeping(guard.clearance_m, guard.footprint_clearance_m, scenario.lidar.range_min_m)
     if scenario.place is not None:
@@ -38,12 +39,19 @@ def _written_out(scenario: Scenario) -> Setup:
     place = scenario.place
     if place is None or len(place.starts) != scenario.robots or len(place.goals) != scenario.robots:
         raise ConfigError("place", f"needs as many starts and goals as robots ({scenario.robots})")
-    return Setup(place.world, np.array(place.starts, float), np.array(place.goals, float))
+    goals, yaws = apart(place.goals)
+    return Setup(place.world, np.array(place.starts, float), goals, yaws)
+
+
+def apart(goals: Sequence[Sequence[float]]) -> tuple[np.ndarray, np.ndarray | None]:
+    """Return goals (N, 2), and the headings wanted there (N,), NaN where any will do; None where none is."""
+    yaws = np.array([goal[2] if len(goal) > 2 else np.nan for goal in goals])
+    return np.array([goal[:2] for goal in goals], float), yaws if np.isfinite(yaws).any() else None
 
 
 def _made(scenario: Scenario) -> Setup:
     """Return the setup of a task, or of a map."""
-    radius, task = scenario.robot.radius_m, scenario.task
+    radius, task = scenario.widest.radius_m, scenario.task
     if task is not None:
         return setup_of_task(task.name, task.options, scenario.seed, scenario.robots, radius)
     if scenario.map is None:
@@ -66,8 +74,15 @@ def _on_map(scenario: Scenario, place: MapModel) -> Setup:
     for key, given in (("starts", starts), ("goals", goals)):
         if len(given) > scenario.robots:
             raise ConfigError(f"map.{key}", f"{len(given)} are given for {scenario.robots} robots: raise 'robots'")
-    wanted = Wanted(scenario.seed, scenario.robots, scenario.robot.radius_m, place.min_distance_m, starts, goals)
-    return place_wanted(world_of(grid), wanted)
+    world = world_of(grid)
+    if place.obstacles:
+        world = WorldSpec(obstacles=[*world.obstacles, *place.obstacles], bounds=world.bounds)
+    radii = scenario.radii_m
+    each = tuple(radii) if isinstance(radii, list) else ()
+    wanted = Wanted(
+        scenario.seed, scenario.robots, scenario.widest.radius_m, place.min_distance_m, starts, goals, each
+    )
+    return place_wanted(world, wanted)
 
 
 def _some_trips(trips: list[Trip], first: int, robots: int) -> list[Trip]:

@@ -19,6 +19,10 @@ REMEDIES = {"place.world.map": ": a map from a file is 'map: {file, starts, goal
 """What to do about keys that people expect."""
 
 
+KINDS = ("alike", "each")
+"""Parts of pydantic's places that are no keys."""
+
+
 def parse_scenario(values: Any, where: str) -> Scenario:
     """Return the scenario in ``values``; a ConfigError names place, problem and the nearest valid key."""
     if not isinstance(values, dict):
@@ -96,10 +100,11 @@ def load_scenario(path: Path | str) -> Scenario:
 def _first_problem(error: ValidationError, where: str) -> ConfigError:
     """Turn pydantic's first error into ours."""
     problem = error.errors()[0]
-    place = ".".join(str(p) for p in problem["loc"]) or "(top)"
+    loc = tuple(part for part in problem["loc"] if part not in KINDS)
+    place = ".".join(str(p) for p in loc) or "(top)"
     message = str(problem["msg"]).removeprefix("Value error, ")
     if problem["type"] == "extra_forbidden":
-        message = f"unknown key{nearest_hint(str(problem['loc'][-1]), _valid_keys(problem['loc'][:-1]))}"
+        message = f"unknown key{nearest_hint(str(loc[-1]), _valid_keys(loc[:-1]))}"
         message += REMEDIES.get(place, "")
     return ConfigError(f"{where}: {place}", message)
 

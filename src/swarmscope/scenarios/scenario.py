@@ -10,14 +10,14 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, Final, Literal, Self
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag, model_validator
 
 from swarmscope.onboard.body import Body
 from swarmscope.onboard.lidar import Lidar
 from swarmscope.onboard.rig import Guarding, Safety, Sharing
 from swarmscope.sim.loop import Setting
 from swarmscope.sim.state import Faults, Noise, Radio
-from swarmscope.sim.world import LONGEST_M, WorldSpec
+from swarmscope.sim.world import LONGEST_M, Obstacle, WorldSpec
 
 
 def _only_numbers(value: Any) -> Any:
@@ -34,6 +34,8 @@ Fraction = Annotated[float, Field(ge=0.0, le=1.0), NUMBER]
 NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False), NUMBER]
 Angle = Annotated[float, Field(ge=0.0, le=45.0), NUMBER]
 Rate = Annotated[float, Field(ge=0.0, le=3600.0), NUMBER]
+Metres = Annotated[float, Field(ge=-LONGEST_M, le=LONGEST_M), NUMBER]
+Heading = Annotated[float, Field(ge=-1000.0, le=1000.0), NUMBER]
 Duration = Annotated[float, Field(ge=0.0, le=86400.0), NUMBER]
 
 BODY: Final = Body()
@@ -54,12 +56,14 @@ class _Strict(BaseModel):
 
 
 class RobotModel(_Strict):
-    """The robots' data sheet: all robots of a run are alike."""
+    """The robots' data sheet; a list of them, one for each robot, when they differ."""
 
     radius_m: Positive = BODY.radius_m
     """Radius of the circle round the body [m]."""
     half_width_m: Positive = BODY.half_width_m
     """Half of the body's width across its direction of travel, r_0 [m]."""
+    footprint: Annotated[list[tuple[Metres, Metres]], Field(min_length=3, max_length=1000)] | None = None
+    """Instead of both: corners of the body round the place that it turns about, x forward, y left [m]."""
     v_max_mps: Positive = BODY.v_max_mps
     """Highest speed [m/s]."""
     a_max_mps2: Positive = BODY.a_max_mps2
@@ -68,6 +72,44 @@ class RobotModel(_Strict):
     """Highest turn rate [rad/s]."""
     sensor_delay_s: NotNegative = BODY.sensor_delay_s
     """From a return to the command that heeds it, t_d: it makes the safety margin r wider [s]."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _measure_footprint(cls, values: Any) -> Any:
+        """Take radius and half width from the footprint."""
+        return values | _size_of(values) if isinstance(values, dict) and values.get("footprint") else values
+
+
+class RobotOfMany(RobotModel):
+    """The data sheet of one robot among others."""
+
+    start_s: Duration = 0.0
+    """When it is switched on; until then it stands at its start and is silent [s]."""
+
+
+def _size_of(values: dict[str, Any]) -> dict[str, float]:
+    """Return radius and half width of the body whose ``footprint`` is given."""
+    try:
+        points = [(float(x), float(y)) for x, y in values["footprint"]]
+    except (TypeError, ValueError, OverflowError):
+        return {}  # which will be said of the footprint itself
+    size = {"radius_m": max(math.hypot(x, y) for x, y in points), "half_width_m": max(abs(y) for _, y in points)}
+    for name, value in size.items():
+        given = values.get(name, value)
+        if isinstance(given, int | float) and abs(given - value) > 1e-9:
+            raise ValueError(f"the footprint makes {name} {value:.4g}, not {given:g}: leave it out")
+    return size
+
+
+def _kind_of_robots(value: Any) -> str:
+    """Tell whether robots are alike or each has its own data sheet."""
+    return "each" if isinstance(value, list) else "alike"
+
+
+Robots = Annotated[
+    Annotated[RobotModel, Tag("alike")] | Annotated[list[RobotOfMany], Tag("each"), Field(min_length=1)],
+    Discriminator(_kind_of_robots),
+]
 
 
 class LidarModel(_Strict):
@@ -172,6 +214,15 @@ class GuardModel(_Strict):
     """How fast others may be; below 0: as fast as these robots, 0: nothing else moves [m/s]."""
     others_yield: bool = GUARDING.others_yield
     """Whether others run the same guard; before those that do not, a robot stands before they can reach it."""
+    others_smallest_m: Annotated[float, Field(ge=-1.0, allow_inf_nan=False), NUMBER] = GUARDING.others_smallest_m
+    """Radius of the smallest other robot; below 0: of the smallest there is [m]."""
+    others_largest_m: Annotated[float, Field(ge=-1.0, allow_inf_nan=False), NUMBER] = GUARDING.others_largest_m
+    """Radius of the largest other robot; below 0: of the largest there is [m]."""
+    strangers_mps: Annotated[float, Field(ge=-1.0, allow_inf_nan=False), NUMBER] = GUARDING.strangers_mps
+    """How fast those are that are no robots and do not yield, people: a robot stands before they can reach it; below 0:
+    as fast as the fastest disc that moves in this world, 0: there are none [m/s]."""
+    strangers_m: Annotated[float, Field(ge=-1.0, allow_inf_nan=False), NUMBER] = GUARDING.strangers_m
+    """Radius of the smallest of them; below 0: of the smallest disc that moves in this world, 0.2 m without one [m]."""
 
 
 class SafetyModel(_Strict):
@@ -200,10 +251,7 @@ class TaskModel(_Strict):
     """Options of the task by name; those not given have their defaults."""
 
 
-Metres = Annotated[float, Field(ge=-LONGEST_M, le=LONGEST_M), NUMBER]
-Heading = Annotated[float, Field(ge=-1000.0, le=1000.0), NUMBER]
-MapStart = tuple[Metres, Metres] | tuple[Metres, Metres, Heading] | None
-MapGoal = tuple[Metres, Metres] | None
+MapPlace = tuple[Metres, Metres] | tuple[Metres, Metres, Heading] | None
 
 
 class MapModel(_Strict):
@@ -216,11 +264,13 @@ class MapModel(_Strict):
     """Side of a cell, for files that do not say it: all but map_server's YAML [m]."""
     number: Annotated[int, Field(ge=0), NUMBER] | None = None
     """Which of ORION's mazes; its starts and goals are the robots' unless others are given."""
-    starts: list[MapStart] = []
+    starts: list[MapPlace] = []
     """Where robots start, in the map's coordinates: x, y or x, y, yaw [m, m, rad]; without yaw they look at their goal.
     What is null, or missing at the end, is drawn."""
-    goals: list[MapGoal] = []
-    """Where robots want to go: x, y [m], in the same way."""
+    goals: list[MapPlace] = []
+    """Where robots want to go, in the same way: x, y or x, y, yaw, to which they turn there [m, m, rad]."""
+    obstacles: list[Obstacle] = []
+    """What stands or moves there besides; each names its ``type``, none is a grid."""
     trips: str | None = None
     """A Moving AI .scen file (looked for beside the scenario, too): starts and goals of its trips."""
     first_trip: Annotated[int, Field(ge=0), NUMBER] = 0
@@ -237,8 +287,8 @@ class WorldModel(_Strict):
     """Bounds and obstacles."""
     starts: list[tuple[Real, Real, Real]]
     """Where each robot starts: x, y, yaw [m, m, rad]."""
-    goals: list[tuple[Real, Real]]
-    """Where each robot wants to go: x, y [m]."""
+    goals: list[tuple[Real, Real] | tuple[Real, Real, Heading]]
+    """Where each robot wants to go, with a yaw to which it turns there or without: x, y or x, y, yaw [m, m, rad]."""
 
 
 class PlannerModel(_Strict):
@@ -267,8 +317,8 @@ class Scenario(_Strict):
     """Number of robots."""
     seed: Annotated[int, Field(ge=0, lt=2**31), NUMBER] = Setting.seed
     """Seed of the world, of all noise and of what planners toss for."""
-    robot: RobotModel = RobotModel()
-    """The robots' data sheet."""
+    robot: Robots = RobotModel()
+    """The robots' data sheet; a list of them, one for each robot, when they differ, with ``start_s`` besides."""
     lidar: LidarModel = LidarModel()
     """The LiDAR."""
     noise: NoiseModel = NoiseModel()
@@ -293,11 +343,13 @@ class Scenario(_Strict):
     @model_validator(mode="before")
     @classmethod
     def _count_robots(cls, values: Any) -> Any:
-        """As many robots as have a start or a goal on the map, if nobody says how many."""
-        place = values.get("map") if isinstance(values, dict) else None
-        if not isinstance(place, dict) or "robots" in values:
+        """As many robots as have a start or a goal on the map, or a data sheet, if nobody says how many."""
+        if not isinstance(values, dict) or "robots" in values:
             return values
+        chosen = values.get("map")
+        place: dict[str, Any] = chosen if isinstance(chosen, dict) else {}
         listed = [place[key] for key in ("starts", "goals") if isinstance(place.get(key), list)]
+        listed += [values["robot"]] if isinstance(values.get("robot"), list) else []
         count = max(map(len, listed), default=0)
         return values | {"robots": count} if count > 0 else values
 
@@ -305,4 +357,21 @@ class Scenario(_Strict):
     def _one_place(self) -> Self:
         if sum(p is not None for p in (self.task, self.map, self.place)) != 1:
             raise ValueError("give exactly one of 'task', 'map' and 'place'")
+        if isinstance(self.robot, list) and len(self.robot) != self.robots:
+            raise ValueError(f"{len(self.robot)} data sheets in 'robot' for {self.robots} 'robots'")
         return self
+
+    @property
+    def sheets(self) -> list[RobotModel]:
+        """The data sheet of each robot."""
+        return [*self.robot] if isinstance(self.robot, list) else [self.robot] * self.robots
+
+    @property
+    def widest(self) -> RobotModel:
+        """The data sheet of the largest robot."""
+        return max(self.sheets, key=lambda sheet: sheet.radius_m) if isinstance(self.robot, list) else self.robot
+
+    @property
+    def radii_m(self) -> float | list[float]:
+        """The robots' radius, or that of each where they have data sheets of their own [m]."""
+        return [sheet.radius_m for sheet in self.robot] if isinstance(self.robot, list) else self.robot.radius_m

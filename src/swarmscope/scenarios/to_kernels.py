@@ -15,9 +15,10 @@ from swarmscope.onboard.planners import Planner, load_planner
 from swarmscope.onboard.rig import Guarding, Rig, Safety, Sharing, make_rig
 from swarmscope.onboard.sensor import Sensor, all_round
 from swarmscope.scenarios.places import is_packaged, map_path
-from swarmscope.scenarios.scenario import NoiseModel, PlannerModel, Scenario
+from swarmscope.scenarios.scenario import NoiseModel, PlannerModel, RobotModel, Scenario
 from swarmscope.sim.lidar import make_beams
 from swarmscope.sim.loop import Setting
+from swarmscope.sim.moving import STANDSTILL, Moving, moving_in, top_speed
 from swarmscope.sim.state import Faults, Noise, Radio
 from swarmscope.sim.world import compile_world
 from swarmscope.tasks import Setup, load_task
@@ -49,9 +50,22 @@ def complete(scenario: Scenario, run_files: bool = True) -> dict[str, Any]:
 
 
 def make_rig_of(scenario: Scenario) -> Rig:
-    """Return what the scenario's robots know of themselves."""
+    """Return what the scenario's robots know of themselves; where they differ, what the largest knows."""
+    return _rig_of(scenario, scenario.widest, STANDSTILL)
+
+
+def make_rigs_of(scenario: Scenario, moving: Moving) -> tuple[Rig, ...]:
+    """Return what each of the scenario's robots knows of itself, the same object for those that are alike."""
+    keys = [str(sheet.model_dump(exclude={"start_s"})) for sheet in scenario.sheets]
+    different = dict(zip(keys, scenario.sheets, strict=True))
+    rigs = {key: _rig_of(scenario, sheet, moving) for key, sheet in different.items()}
+    return tuple(rigs[key] for key in keys)
+
+
+def _rig_of(scenario: Scenario, sheet: RobotModel, moving: Moving) -> Rig:
+    """Return what a robot with this data sheet knows of itself, of the others and of what ``moving`` there is."""
     beams = make_beams(scenario.lidar.beams, math.radians(scenario.lidar.fov_deg), scenario.lidar.range_m)
-    robot, noise = scenario.robot, scenario.noise
+    noise = scenario.noise
     sensor = Sensor(
         beams=scenario.lidar.beams,
         angle_min=beams.angle_min,
@@ -62,13 +76,13 @@ def make_rig_of(scenario: Scenario) -> Rig:
         range_sigma=noise.range_fraction,
         position_sigma=math.hypot(noise.range_fraction, math.radians(noise.bearing_deg)),
     )
-    body = Body(**robot.model_dump())
+    body = body_of(sheet)
     guard, safety = scenario.guard, scenario.safety
     return _latest_rig(
         body,
         all_round(sensor),
         Guarding(
-            **guard.model_dump(exclude_none=True),
+            **guard.model_dump(exclude_none=True) | _about_others(scenario, moving),
             latency_s=noise.scan_age_s,
             odometry_scale=noise.odometry_scale,
             odometry_drift_m=noise.odometry_drift_m,
@@ -79,9 +93,28 @@ def make_rig_of(scenario: Scenario) -> Rig:
     )
 
 
-@lru_cache(maxsize=1)
+def body_of(sheet: RobotModel) -> Body:
+    """Return the data sheet as planners know it."""
+    return Body(**sheet.model_dump(include=set(Body._fields)))
+
+
+def _about_others(scenario: Scenario, moving: Moving) -> dict[str, float]:
+    """Return what the guard has to know of other robots and of what moves, as far as the scenario does not say it."""
+    sheets, guard = scenario.sheets if isinstance(scenario.robot, list) else [], scenario.guard
+    found = {"strangers_mps": top_speed(moving)}
+    if moving.radius.size:
+        found["strangers_m"] = float(moving.radius.min())
+    if sheets:
+        radii = [sheet.radius_m for sheet in sheets]
+        found |= {"others_smallest_m": min(radii), "others_largest_m": max(radii)}
+        found["others_mps"] = max(sheet.v_max_mps for sheet in sheets)
+    said = guard.model_fields_set
+    return {key: value for key, value in found.items() if key not in said or getattr(guard, key) < 0.0}
+
+
+@lru_cache(maxsize=8)
 def _latest_rig(body: Body, sensor: Sensor, guarding: Guarding, safety: Safety, sharing: Sharing) -> Rig:
-    """Return the rig of this data sheet; that of the last one asked for, whose tables take long, is kept."""
+    """Return the rig of this data sheet; those of the last ones asked for, whose tables take long, are kept."""
     return make_rig(body, sensor, guarding, safety, sharing)
 
 
@@ -120,8 +153,10 @@ def make_setting(scenario: Scenario, setup: Setup, threads: int = 1) -> Setting:
     """Return the run of ``scenario`` in ``setup``, ready for the kernels."""
     planner = planner_of(scenario.planner)
     ticks = scenario.limit_s * scenario.lidar.rate_hz
-    rig, dt = make_rig_of(scenario), 1.0 / scenario.lidar.rate_hz
-    check_horizon(rig, dt)
+    moving, dt = moving_in(setup.world), 1.0 / scenario.lidar.rate_hz
+    rigs = make_rigs_of(scenario, moving)
+    for rig in dict(zip(map(id, rigs), rigs, strict=True)).values():
+        check_horizon(rig, dt)
     heavy = ticks * scenario.robots * scenario.lidar.beams > 4e7
     return Setting(
         world=compile_world(setup.world),
@@ -129,7 +164,7 @@ def make_setting(scenario: Scenario, setup: Setup, threads: int = 1) -> Setting:
         starts=setup.starts,
         goals=setup.goals,
         beams=make_beams(scenario.lidar.beams, math.radians(scenario.lidar.fov_deg), scenario.lidar.range_m),
-        rig=rig,
+        rig=rigs[0],
         planner=planner,
         params=_with_run_seed(planner.params(scenario.planner.params), scenario.seed),
         noise=_noise_of(scenario.noise),
@@ -140,5 +175,9 @@ def make_setting(scenario: Scenario, setup: Setup, threads: int = 1) -> Setting:
         substeps=scenario.substeps,
         limit_s=scenario.limit_s,
         threads=threads,
+        goal_yaws=setup.goal_yaws,
+        moving=moving,
+        rigs=rigs if isinstance(scenario.robot, list) else (),
+        start_s=tuple(sheet.start_s for sheet in scenario.robot) if isinstance(scenario.robot, list) else (),
         record_scans=scenario.record_scans == "yes" or (scenario.record_scans == "auto" and not heavy),
     )

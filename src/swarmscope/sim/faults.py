@@ -17,7 +17,7 @@ from swarmscope.onboard.percept import DECISION, Row, new_shared
 from swarmscope.onboard.planners import Planner
 from swarmscope.onboard.reasons import R_BLOCKED_WAIT, YIELD
 from swarmscope.onboard.view import Swarm
-from swarmscope.sim.state import Faults, Sim
+from swarmscope.sim.state import Sim
 from swarmscope.sim.streams import CLOCK_JUMP, RESTART, SILENCE, boot_number, key, uniform
 
 HOUR = 3600.0
@@ -106,12 +106,12 @@ def forget(sim: Sim, tick: int, rows: np.ndarray, blank: np.ndarray) -> None:
                 rows[i, b] = blank[i % blank.shape[0], b]
 
 
-def blanks(planner: Planner, swarm: Swarm, memory: np.ndarray, faults: Faults) -> list[tuple[np.ndarray, np.ndarray]]:
+def blanks(planner: Planner, swarm: Swarm, memory: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
     """Return all that robots remember and decide, as bytes (N, B), each with what it is at first (N or 1, B)."""
-    if not faults.restarts_per_h > 0.0:
-        return []
     if memory.dtype.hasobject:
-        raise ConfigError("faults.restarts_per_h", f"planner '{planner.name}' keeps Python objects in its memory")
+        raise ConfigError(
+            "faults.restarts_per_h, robot.start_s", f"planner '{planner.name}' keeps Python objects in its memory"
+        )
     decision = np.zeros(1, DECISION)
     decision["p_self"] = decision["p_left"] = np.nan
     decision["state"], decision["reason"] = YIELD, R_BLOCKED_WAIT

@@ -12,6 +12,7 @@ from swarmscope._jit import jit, jit_inner
 from swarmscope.geometry import Pose, seen_from, then, wrap_angle
 from swarmscope.sim.cells import column_of, row_of
 from swarmscope.sim.lidar import cast_disc, cast_static
+from swarmscope.sim.moving import cast_moving
 from swarmscope.sim.state import Sim
 from swarmscope.sim.streams import SCAN_AGE, key, uniform
 
@@ -69,9 +70,11 @@ def cast_late(sim: Sim, tick: int, i: int) -> None:
     percept["scan_x"], percept["scan_y"], percept["scan_yaw"] = _back(sim, tick, i, age)
     x, y, yaw = _pose_before(sim, tick, i, age)
     cast_static(sim.world, x, y, yaw, beams, ranges)
-    reach = beams.range_max + sim.radius
-    wide = reach + sim.v_max * age_s  # they have driven since
+    reach = beams.range_max + sim.widest
+    wide = reach + sim.fastest * age_s  # they have driven since
     c, s = math.cos(yaw), math.sin(yaw)
+    if sim.moving.radius.size + sim.moving.closed.size > 0:
+        cast_moving(sim.moving, max(0.0, (tick - age) * sim.clock.dt), x, y, c, s, beams, ranges)
     columns = int(sim.cell_layout[2])
     for row in range(row_of(sim, y - wide), row_of(sim, y + wide) + 1):
         begin = sim.cell_start[row * columns + column_of(sim, x - wide)]
@@ -83,4 +86,4 @@ def cast_late(sim: Sim, tick: int, i: int) -> None:
             other = _pose_before(sim, tick, j, age)
             dx, dy = other[0] - x, other[1] - y
             if dx * dx + dy * dy < reach * reach:
-                cast_disc(c * dx + s * dy, c * dy - s * dx, sim.radius, beams, ranges)
+                cast_disc(c * dx + s * dy, c * dy - s * dx, sim.robots[j]["radius"], beams, ranges)

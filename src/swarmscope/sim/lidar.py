@@ -97,7 +97,7 @@ def cast_disc(cx: float, cy: float, radius: float, beams: Beams, out: Ranges) ->
 
 
 @jit
-def _cast_segment(ax: float, ay: float, bx: float, by: float, beams: Beams, out: Ranges) -> None:
+def cast_segment(ax: float, ay: float, bx: float, by: float, beams: Beams, out: Ranges) -> None:
     """Lower ``out`` (M,) where segment a-b [m], sensor frame, is nearer."""
     total = out.shape[0]
     angle_a, angle_b = rough_angle(ax, ay), rough_angle(bx, by)
@@ -200,7 +200,7 @@ def _cast_segments(
             if world.one_sided[i] and ax * by - ay * bx >= 0.0:
                 continue
             if 0.25 * ((ax + bx) * (ax + bx) + (ay + by) * (ay + by)) <= reach * reach:
-                _cast_segment(ax, ay, bx, by, beams, out)
+                cast_segment(ax, ay, bx, by, beams, out)
 
 
 @jit

@@ -24,6 +24,7 @@ from swarmscope.sim.cells import index_robots
 from swarmscope.sim.faults import blanks, forget, strike
 from swarmscope.sim.lidar import Beams
 from swarmscope.sim.motion import judge, move
+from swarmscope.sim.moving import STANDSTILL, Moving
 from swarmscope.sim.radio import exchange
 from swarmscope.sim.sensing import sense
 from swarmscope.sim.state import (
@@ -57,6 +58,7 @@ class Setting:
     goals: np.ndarray
     beams: Beams
     rig: Rig
+    """Of all robots, or of the first where they differ."""
     planner: Planner
     params: Any
     noise: Noise = field(default_factory=Noise)
@@ -70,6 +72,13 @@ class Setting:
     record_scans: bool = False
     advice: Advice | None = None
     """Costs to go, for planners that are told the side of the shortest way, and for judging those that are not."""
+    goal_yaws: np.ndarray | None = None
+    """(N,): headings wanted at the goals [rad], NaN where any will do."""
+    moving: Moving = STANDSTILL
+    rigs: tuple[Rig, ...] = ()
+    """One for each robot where they differ, the same object for those that are alike."""
+    start_s: tuple[float, ...] = ()
+    """When each robot is switched on; nothing: at once."""
 
 
 @dataclass(frozen=True)
@@ -186,9 +195,10 @@ def run(
     sim, swarm = begin(setting)
     n = len(setting.starts)
     memory = setting.planner.new_memory(n)
-    forgotten = blanks(setting.planner, swarm, memory, setting.faults)
+    late = max(setting.start_s, default=0.0) > 0.0
+    forgotten = blanks(setting.planner, swarm, memory) if late or setting.faults.restarts_per_h > 0.0 else []
     held = Held(sim)
-    step_all = partial(_step, setting, Held(swarm), memory)
+    step_all = _stepper(setting, swarm, memory)
     beams = sim.ranges.shape[1] if setting.record_scans else 0
     ticks = math.ceil(setting.limit_s / setting.dt - 1e-9)
     chunks: list[Records] = []
@@ -247,14 +257,25 @@ def run(
 def begin(setting: Setting) -> tuple[Sim, Swarm]:
     """Return the simulation of a setting at its start, and the rows of its robots."""
     clock = Clock(int(setting.seed), float(setting.dt), int(setting.substeps))
-    start = Start(setting.starts, setting.goals, setting.bounds)
+    goals = setting.goals if setting.goal_yaws is None else np.column_stack([setting.goals, setting.goal_yaws])
+    start = Start(setting.starts, goals, setting.bounds, setting.moving, setting.rigs, setting.start_s)
     conditions = Conditions(setting.noise, setting.radio, setting.faults)
     return new_sim(setting.world, setting.beams, setting.rig, start, conditions, clock)
 
 
-def _step(setting: Setting, held: Held[Swarm], memory: np.ndarray, first: int, last: int) -> None:
-    """Run one tick of robots ``first`` to ``last - 1``."""
-    setting.planner.step_all(first, last, held, memory, setting.params)
+def _stepper(setting: Setting, swarm: Swarm, memory: np.ndarray) -> Callable[[int, int], None]:
+    """Return what runs one tick of robots ``first`` to ``last - 1``; those that are alike, side by side, in one go."""
+    rigs = setting.rigs or (setting.rig,) * len(setting.starts)
+    edges = [i for i in range(1, len(rigs)) if rigs[i] is not rigs[i - 1]]
+    groups = [(a, b, Held(swarm._replace(rig=rigs[a]))) for a, b in pairwise([0, *edges, len(rigs)])]
+
+    def step_all(first: int, last: int) -> None:
+        for a, b, held in groups:
+            begin, end = max(a, first), min(b, last)
+            if begin < end or (begin == end == a == first):
+                setting.planner.step_all(begin, end, held, memory, setting.params)
+
+    return step_all
 
 
 def _time_steps(step_all: Callable[[int, int], None], robots: int) -> list[float]:

@@ -11,6 +11,7 @@ from swarmscope.sim.cells import column_of, row_of
 from swarmscope.sim.errors import compass_error, measure_motion, spoil_scan
 from swarmscope.sim.lateness import cast_late, note_pose
 from swarmscope.sim.lidar import Beams, cast_disc, cast_static
+from swarmscope.sim.moving import cast_moving
 from swarmscope.sim.state import Sim
 from swarmscope.sim.streams import BEARING_NOISE, RANGE_NOISE, key, mix, normal
 
@@ -37,6 +38,7 @@ def _sense_self(sim: Sim, tick: int, i: int) -> None:
     percept["compass"] = wrap_angle(heading)
     percept["goal_bearing"] = wrap_angle(math.atan2(gy, gx) - heading)
     percept["goal_distance"] = math.sqrt(gx * gx + gy * gy)
+    percept["goal_turn"] = wrap_angle(robot["goal_yaw"] - heading)
     measure_motion(sim, tick, i)
 
 
@@ -46,8 +48,10 @@ def _scan_and_neighbours(sim: Sim, tick: int, i: int) -> None:
     robot, percept, ranges = sim.robots[i], sim.percepts[i], sim.ranges[i]
     x, y, yaw = robot["x"], robot["y"], robot["yaw"]
     cast_static(sim.world, x, y, yaw, sim.beams, ranges)
-    reach = sim.beams.range_max + sim.radius
+    reach = sim.beams.range_max + sim.widest
     c, s = math.cos(yaw), math.sin(yaw)
+    if sim.moving.radius.size + sim.moving.closed.size > 0:
+        cast_moving(sim.moving, tick * sim.clock.dt, x, y, c, s, sim.beams, ranges)
     columns = int(sim.cell_layout[2])
     found = 0
     for row in range(row_of(sim, y - reach), row_of(sim, y + reach) + 1):
@@ -59,7 +63,7 @@ def _scan_and_neighbours(sim: Sim, tick: int, i: int) -> None:
             if j == i or dx * dx + dy * dy >= reach * reach:
                 continue
             bx, by = c * dx + s * dy, c * dy - s * dx
-            cast_disc(bx, by, sim.radius, sim.beams, ranges)
+            cast_disc(bx, by, sim.robots[j]["radius"], sim.beams, ranges)
             found = _insert(percept, found, j, bx, by)
     _keep_visible(sim, tick, i, found)
     if sim.noise.scan_age_s > 0.0:
@@ -99,7 +103,7 @@ def _keep_visible(sim: Sim, tick: int, i: int, found: int) -> None:
         j, x, y = ids[k], xs[k], ys[k]
         distance = math.sqrt(x * x + y * y)
         bearing = math.atan2(y, x)
-        if not (_shows(sim, i, distance, bearing) or (not beams.wraps and _in_sight(sim, i, j, found))):
+        if not (_shows(sim, i, j, distance, bearing) or (not beams.wraps and _in_sight(sim, tick, i, j, found))):
             continue
         if noise.range_fraction > 0.0 or noise.bearing_rad > 0.0:
             bits = mix(key(sim.clock.seed, i, tick, RANGE_NOISE) + key(0, j, 0, RANGE_NOISE))
@@ -115,9 +119,9 @@ def _keep_visible(sim: Sim, tick: int, i: int, found: int) -> None:
 
 
 @jit_inner
-def _shows(sim: Sim, i: int, distance: float, bearing: float) -> bool:
-    """Tell whether a beam of robot i's noise-free scan ends on a robot at ``distance`` [m] and ``bearing`` [rad]."""
-    beams, ranges, radius = sim.beams, sim.ranges[i], sim.radius
+def _shows(sim: Sim, i: int, j: int, distance: float, bearing: float) -> bool:
+    """Tell whether a beam of robot i's noise-free scan ends on robot j, at ``distance`` [m] and ``bearing`` [rad]."""
+    beams, ranges, radius = sim.beams, sim.ranges[i], sim.robots[j]["radius"]
     middle = (bearing - beams.angle_min) / beams.increment
     spread = math.asin(min(1.0, radius / max(distance, 1e-9))) / beams.increment
     for k in range(int(math.ceil(middle - spread)), int(math.floor(middle + spread)) + 1):
@@ -132,7 +136,7 @@ def _shows(sim: Sim, i: int, distance: float, bearing: float) -> bool:
 
 
 @jit_inner
-def _in_sight(sim: Sim, i: int, j: int, found: int) -> bool:
+def _in_sight(sim: Sim, tick: int, i: int, j: int, found: int) -> bool:
     """Tell whether nothing stands between the centres of robots i and j, where the LiDAR need not look.
 
     Mutual positioning is a sensor of its own: it works all round. Who could be in between is among the first ``found``
@@ -145,12 +149,14 @@ def _in_sight(sim: Sim, i: int, j: int, found: int) -> bool:
     beams = Beams(sim.straight_cos, sim.straight_sin, 0.0, 2.0 * math.pi, True, max(distance, 1e-3))
     cast_static(sim.world, robot["x"], robot["y"], towards, beams, ray)
     c, s = dx / max(distance, 1e-9), dy / max(distance, 1e-9)
+    if sim.moving.radius.size + sim.moving.closed.size > 0:
+        cast_moving(sim.moving, tick * sim.clock.dt, robot["x"], robot["y"], c, s, beams, ray)
     for k in range(found):
         third = sim.percepts[i]["neighbour_id"][k]
         if third != j:
             ex, ey = sim.robots[third]["x"] - robot["x"], sim.robots[third]["y"] - robot["y"]
-            cast_disc(c * ex + s * ey, c * ey - s * ex, sim.radius, beams, ray)
-    return bool(ray[0] >= distance - sim.radius - SIGHT_SLACK)
+            cast_disc(c * ex + s * ey, c * ey - s * ex, sim.robots[third]["radius"], beams, ray)
+    return bool(ray[0] >= distance - other["radius"] - SIGHT_SLACK)
 
 
 @jit_inner

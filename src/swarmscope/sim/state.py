@@ -12,6 +12,7 @@ from swarmscope.onboard.rig import Rig
 from swarmscope.onboard.sharing.message import MAX_PACKET_BYTES
 from swarmscope.onboard.view import Swarm, new_swarm
 from swarmscope.sim.lidar import Beams
+from swarmscope.sim.moving import STANDSTILL, Moving
 from swarmscope.sim.streams import boot_number
 from swarmscope.sim.world import World
 
@@ -29,6 +30,11 @@ ROBOT = np.dtype(
         ("last_yaw", np.float64),
         ("goal_x", np.float64),
         ("goal_y", np.float64),
+        ("goal_yaw", np.float64),  # heading wanted there, NaN: any
+        ("radius", np.float64),
+        ("v_max", np.float64),
+        ("a_max", np.float64),
+        ("w_max", np.float64),
         ("boots", np.int64),  # starts after the first one
         ("down_until", np.int64),  # tick in which it runs again
         ("silences", np.int64),  # times that its radio fell silent
@@ -38,6 +44,8 @@ ROBOT = np.dtype(
         ("crashed", np.uint8),
         ("arrived", np.uint8),
         ("arrival_s", np.float64),
+        ("touched", np.int64),  # times that a disc on its way walked into it while it stood
+        ("in_touch", np.uint8),
         ("length", np.float64),
         ("waited_s", np.float64),
         ("clearance", np.float64),  # smallest in the last tick, to anything [m]
@@ -55,6 +63,10 @@ ROBOT = np.dtype(
         ("queued", np.int64),
     ]
 )
+
+
+BODY_FIELDS = {"radius": "radius_m", "v_max": "v_max_mps", "a_max": "a_max_mps2", "w_max": "w_max_radps"}
+"""Fields of ``ROBOT`` that hold a robot's data sheet, and of ``Body``."""
 
 
 CHOICE = np.dtype(
@@ -219,10 +231,11 @@ class Sim(NamedTuple):
     links_n: np.ndarray
     choices: np.ndarray
     choices_n: np.ndarray
-    radius: float
-    v_max: float
-    a_max: float
-    w_max: float
+    moving: Moving
+    widest: float
+    """Largest radius of a robot [m]."""
+    fastest: float
+    """Highest top speed of a robot [m/s]."""
     range_min: float
     noise: Noise
     radio: Radio
@@ -244,15 +257,20 @@ class Start(NamedTuple):
     starts: np.ndarray
     """(N, 3) x, y [m], yaw [rad]."""
     goals: np.ndarray
-    """(N, 2)."""
+    """(N, 2), or (N, 3) with the heading that is wanted there [rad], NaN where any will do."""
     bounds: tuple[float, float, float, float]
+    moving: Moving = STANDSTILL
+    rigs: tuple[Rig, ...] = ()
+    """One for each robot where they differ."""
+    start_s: tuple[float, ...] = ()
+    """When each is switched on; nothing: at once."""
 
 
 def new_sim(
     world: World, beams: Beams, rig: Rig, start: Start, conditions: Conditions, clock: Clock
 ) -> tuple[Sim, Swarm]:
     """Return the simulation at its start, and the rows of its robots."""
-    starts, goals, bounds = start
+    starts, goals, bounds = start.starts, start.goals, start.bounds
     noise, radio, faults = conditions
     n = len(starts)
     robots = np.zeros(n, ROBOT)
@@ -260,12 +278,19 @@ def new_sim(
         robots[name] = starts[:, k]
         robots[f"last_{name}"] = starts[:, k]
     robots["goal_x"], robots["goal_y"] = goals[:, 0], goals[:, 1]
+    robots["goal_yaw"] = goals[:, 2] if goals.shape[1] > 2 else np.nan
+    bodies = [one.body for one in start.rigs or (rig,)]
+    for name in ("radius", "v_max", "a_max", "w_max"):
+        robots[name] = [getattr(body, BODY_FIELDS[name]) for body in bodies]
+    robots["down_until"] = np.ceil(np.array(start.start_s or [0.0]) / clock.dt - 1e-9).astype(np.int64)
+    robots["clock_s"] = -robots["down_until"] * clock.dt
     robots["arrival_s"] = np.nan
     robots["min_clearance"] = np.inf
     robots["clearance"] = np.inf
-    swarm = new_swarm(n, rig)
+    swarm = new_swarm(n, max((rig, *start.rigs), key=lambda one: one.half))
     swarm.percepts["dt_s"] = clock.dt
-    clock = clock._replace(substeps=enough_substeps(clock, rig.body.v_max_mps, rig.body.w_max_radps))
+    fastest = max(body.v_max_mps for body in bodies)
+    clock = clock._replace(substeps=enough_substeps(clock, fastest, max(body.w_max_radps for body in bodies)))
     with np.errstate(over="ignore"):  # without the compiler
         swarm.percepts["boot"] = [boot_number(clock.seed, i, 0) for i in range(n)]
     columns = max(1, int(np.ceil((bounds[2] - bounds[0]) / CELL_M)))
@@ -299,10 +324,9 @@ def new_sim(
         links_n=np.zeros(1, np.int64),
         choices=np.zeros(CHOICES, CHOICE),
         choices_n=np.zeros(1, np.int64),
-        radius=float(rig.body.radius_m),
-        v_max=float(rig.body.v_max_mps),
-        a_max=float(rig.body.a_max_mps2),
-        w_max=float(rig.body.w_max_radps),
+        moving=start.moving._replace(closed=start.moving.closed.copy()),
+        widest=float(robots["radius"].max()),
+        fastest=float(fastest),
         range_min=float(rig.sensor.range_min),
         noise=Noise(*(float(v) for v in noise)),
         radio=radio,

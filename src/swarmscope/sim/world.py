@@ -14,6 +14,7 @@ from typing import Annotated, Any, Literal, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
+from mapbox_earcut import triangulate_float64 as earcut
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 from swarmscope._jit import jit, jit_inline
@@ -31,6 +32,10 @@ BIN_M = 1.0
 BINS_PER_SIDE = 512
 LONGEST_M = 1.0e5
 MAX_CELLS = 100_000_000
+FASTEST_MPS = 100.0
+LONGEST_S = 1.0e6
+MOST_POINTS = 100_000
+"""Of the way of a disc, or times of a door."""
 GAP_CAP = 255
 
 Floats = npt.NDArray[np.float64]
@@ -47,6 +52,8 @@ def _reject_text(value: Any) -> Any:
 _Finite = Annotated[float, BeforeValidator(_reject_text), Field(allow_inf_nan=False)]
 Number = Annotated[_Finite, Field(ge=-LONGEST_M, le=LONGEST_M)]
 Length = Annotated[_Finite, Field(gt=0.0, le=LONGEST_M)]
+Speed = Annotated[_Finite, Field(ge=-FASTEST_MPS, le=FASTEST_MPS)]
+Time = Annotated[_Finite, Field(ge=0.0, le=LONGEST_S)]
 Point = tuple[Number, Number]
 
 
@@ -57,18 +64,38 @@ class _Model(BaseModel):
 
 
 class Circle(_Model):
-    """A disc: ``center`` [x, y] and ``radius`` [m], world frame."""
+    """A disc: ``center`` [x, y] and ``radius`` [m], world frame; with ``velocity`` or a ``way`` it moves."""
 
     type: Literal["circle"] = "circle"
     """What it is."""
     center: Point
-    """x, y [m]."""
+    """x, y [m]; of a disc that moves: in the beginning."""
     radius: Length
     """Its radius [m]."""
+    velocity: tuple[Speed, Speed] | None = None
+    """It moves on like this for ever: vx, vy [m/s]."""
+    way: Annotated[list[Point], Field(min_length=1, max_length=MOST_POINTS)] | None = None
+    """Where it goes from its centre, one point after the other: x, y [m]."""
+    speed_mps: Annotated[Speed, Field(gt=0.0)] | None = None
+    """Its speed along its way [m/s]."""
+    times_s: Annotated[list[Time], Field(max_length=MOST_POINTS)] | None = None
+    """Instead of its speed: when it is at each point of its way [s]."""
+    repeat: Literal["back", "loop", "once"] | None = None
+    """At the end of its way it turns back (so it is when nothing is said), goes to its centre and on, or stays."""
+
+    @property
+    def moves(self) -> bool:
+        """Whether it does not stand."""
+        return self.velocity is not None or self.way is not None
+
+    @model_validator(mode="after")
+    def _check_way(self) -> Self:
+        _check_motion(self)
+        return self
 
 
 class Polygon(_Model):
-    """A solid convex polygon: ``points`` [[x, y], ...] [m], at least 3, in either orientation."""
+    """A solid polygon, convex or not: ``points`` [[x, y], ...] [m], at least 3, in either orientation."""
 
     type: Literal["polygon"] = "polygon"
     """What it is."""
@@ -76,8 +103,8 @@ class Polygon(_Model):
     """Its corners x, y, one after the other [m]."""
 
     @model_validator(mode="after")
-    def _check_convex(self) -> Self:
-        _corners(self)
+    def _check_shape(self) -> Self:
+        _convex_parts(self)
         return self
 
 
@@ -94,6 +121,28 @@ class Wall(_Model):
         for index, (first, second) in enumerate(pairwise(self.points)):
             if first == second:
                 raise ValueError(f"points {index} and {index + 1} of the wall are the same")
+        return self
+
+
+class Door(_Model):
+    """A straight wall, 0.02 m thick, that opens and closes; it closes only when no robot is near."""
+
+    type: Literal["door"] = "door"
+    """What it is."""
+    points: Annotated[list[Point], Field(min_length=2, max_length=2)]
+    """Its ends x, y [m]."""
+    open_s: Annotated[list[tuple[Time, Time]], Field(max_length=MOST_POINTS)]
+    """When it is open: from, until [s]."""
+    every_s: Annotated[Time, Field(gt=0.0)] | None = None
+    """After this it begins anew [s]."""
+
+    @model_validator(mode="after")
+    def _check_times(self) -> Self:
+        if self.points[0] == self.points[1]:
+            raise ValueError("the ends of the door are the same")
+        for index, (first, last) in enumerate(self.open_s):
+            if not first < last <= (self.every_s or math.inf):
+                raise ValueError(f"open_s {index} {[first, last]} is not [from, until], from < until <= every_s")
         return self
 
 
@@ -133,14 +182,14 @@ class Grid(_Model):
         return self
 
 
-Obstacle = Annotated[Circle | Polygon | Wall | Grid, Field(discriminator="type")]
+Obstacle = Annotated[Circle | Polygon | Wall | Door | Grid, Field(discriminator="type")]
 
 
 class WorldSpec(_Model):
     """What stands in the world: ``obstacles`` (at most one grid) and ``bounds`` [x0, y0, x1, y1] [m]."""
 
     obstacles: list[Obstacle] = Field(default_factory=list)
-    """Circles, convex polygons, walls, and at most one occupancy grid; each names its ``type``."""
+    """Circles, polygons, walls, doors, and at most one occupancy grid; each names its ``type``."""
     bounds: tuple[Number, Number, Number, Number]
     """Lower left and upper right corner of what is drawn, no walls: x0, y0, x1, y1 [m]."""
 
@@ -188,7 +237,7 @@ class World(NamedTuple):
     one_sided: Bytes
     """(S,) 1 = side of a wall, seen from its right only: from anywhere else another part of the wall is before it."""
     vertices: Floats
-    """(V, 2) corners of walls and of the convex polygons, counter-clockwise [m]."""
+    """(V, 2) corners of walls and of the convex parts of polygons, counter-clockwise [m]."""
     vertex_start: Ints
     """(P + 1,) first corner of each polygon."""
     bins: Bins
@@ -229,9 +278,9 @@ def _compiled(spec: WorldSpec) -> World:
     walls = [np.asarray(o.points, dtype=np.float64) for o in spec.obstacles if isinstance(o, Wall)]
     circles = np.concatenate([_circle_rows(spec), *map(_joints, walls)])
     bars = [bar for wall in walls for a, b in pairwise(wall) for bar in _bars(a, b)]
-    solids = [_corners(obstacle) for obstacle in spec.obstacles if isinstance(obstacle, Polygon)]
-    segments = _segment_rows(bars, solids)
-    polygons = bars + solids
+    shapes = [_convex_parts(obstacle) for obstacle in spec.obstacles if isinstance(obstacle, Polygon)]
+    segments = _segment_rows(bars, [outline for outline, _ in shapes])
+    polygons = bars + [part for _, parts in shapes for part in parts]
     x0, y0, size, columns, rows = _bin_layout(spec, circles, segments)
 
     def bin_of(points: Floats) -> Ints:
@@ -317,32 +366,72 @@ def solid_from_grid(grid: Grid) -> Bytes:
     return solid
 
 
-def _corners(polygon: Polygon) -> Floats:
-    return _counter_clockwise(np.asarray(polygon.points, dtype=np.float64))
+def _check_motion(disc: Circle) -> None:
+    """Raise a ValueError unless it is clear how a disc moves."""
+    if disc.way is None:
+        if any(given is not None for given in (disc.speed_mps, disc.times_s, disc.repeat)):
+            raise ValueError("speed_mps, times_s and repeat are those of a 'way'")
+        return
+    if disc.velocity is not None or (disc.speed_mps is None) == (disc.times_s is None):
+        raise ValueError("a disc that moves has either a velocity, or a way with speed_mps or times_s")
+    points = [disc.center, *disc.way]
+    if disc.times_s is None:
+        if max(math.dist(a, b) for a, b in pairwise(points)) == 0.0:
+            raise ValueError("the way leads nowhere")
+        return
+    times = [0.0, *disc.times_s]
+    if len(times) != len(points):
+        raise ValueError(f"{len(disc.times_s)} times_s for {len(disc.way)} points of the way")
+    for index, ((a, b), (t, u)) in enumerate(zip(pairwise(points), pairwise(times), strict=True)):
+        if not t < u or math.dist(a, b) > FASTEST_MPS * (u - t):
+            raise ValueError(f"times_s {index}: {u:g} s is too early")
 
 
-def _counter_clockwise(points: Floats) -> Floats:
-    """Return the corners (n, 2) counter-clockwise; a ValueError says why they are no convex polygon."""
-    edges = np.roll(points, -1, axis=0) - points
-    lengths = np.hypot(edges[:, 0], edges[:, 1])
+def _convex_parts(polygon: Polygon) -> tuple[Floats, list[Floats]]:
+    """Return the outline (n, 2) counter-clockwise, and convex parts that fill it; a ValueError says what is wrong."""
+    points = _without_repeats(np.asarray(polygon.points, dtype=np.float64))
+    turns, cross = _turns(points)
+    if float(np.sum(turns)) < 0.0:
+        points = np.ascontiguousarray(points[::-1])
+        turns, cross = _turns(points)
+    if np.max(cross) < 1e-9 or np.any(np.abs(turns) > math.pi - 1e-9):
+        raise ValueError("the polygon is degenerate: its points lie on a line, or it folds back on itself")
+    if np.min(turns) >= -1e-9 and abs(float(np.sum(turns)) - 2.0 * math.pi) < 1e-3:
+        return points, [points]
+    triangles = points[earcut(points, np.array([len(points)], np.uint32)).reshape(-1, 3).astype(np.int64)]
+    areas = np.array([_area(triangle) for triangle in triangles])
+    if not math.isclose(np.abs(areas).sum(), _area(points), rel_tol=1e-9):
+        raise ValueError("the polygon crosses itself: its edges may only meet in its corners")
+    turned = zip(triangles, areas, strict=True)
+    return points, [triangle if area > 0.0 else triangle[::-1] for triangle, area in turned if area != 0.0]
+
+
+def _area(points: Floats) -> float:
+    """Return the area [m²] inside corners (n, 2), below 0 where they go round clockwise."""
+    x, y = (points - points[0]).T
+    return 0.5 * float(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1)))
+
+
+def _without_repeats(points: Floats) -> Floats:
+    """Return the corners (n, 2), checked to be different from the ones before them."""
+    lengths = np.hypot(*(np.roll(points, -1, axis=0) - points).T)
     if not np.all(lengths > 0.0):
         index = int(np.argmin(lengths))
         raise ValueError(f"points {index} and {(index + 1) % len(points)} of the polygon are the same")
-    directions = edges / lengths[:, None]
-    following = np.roll(directions, -1, axis=0)
-    cross = directions[:, 0] * following[:, 1] - directions[:, 1] * following[:, 0]
-    turns = np.arctan2(cross, np.sum(directions * following, axis=1))
-    if float(np.sum(turns)) < 0.0:
-        return _counter_clockwise(np.ascontiguousarray(points[::-1]))
-    if np.max(cross) < 1e-9 or np.any(np.abs(turns) > math.pi - 1e-9):
-        raise ValueError("the polygon is degenerate: its points lie on a line, or it folds back on itself")
-    if np.min(turns) < -1e-9 or abs(float(np.sum(turns)) - 2.0 * math.pi) > 1e-3:
-        raise ValueError("the polygon is not convex; split it into convex parts")
     return points
 
 
+def _turns(points: Floats) -> tuple[Floats, Floats]:
+    """Return by how much a way round corners (n, 2) turns at each [rad], and the sines of these."""
+    edges = np.roll(points, -1, axis=0) - points
+    directions = edges / np.hypot(edges[:, 0], edges[:, 1])[:, None]
+    following = np.roll(directions, -1, axis=0)
+    cross = directions[:, 0] * following[:, 1] - directions[:, 1] * following[:, 0]
+    return np.arctan2(cross, np.sum(directions * following, axis=1)), cross
+
+
 def _circle_rows(spec: WorldSpec) -> Floats:
-    rows = [[*o.center, o.radius] for o in spec.obstacles if isinstance(o, Circle)]
+    rows = [[*o.center, o.radius] for o in spec.obstacles if isinstance(o, Circle) and not o.moves]
     return np.asarray(rows, dtype=np.float64).reshape(-1, 3)
 
 

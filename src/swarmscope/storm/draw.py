@@ -188,7 +188,7 @@ def _check_sheet(values: dict[str, Any]) -> None:
 def _limit_s(scenario: Scenario, setup: Setup) -> float:
     """Return how long a run may take: about three times the longest way there can be, within bounds."""
     x0, y0, x1, y1 = setup.world.bounds
-    wanted = 3.0 * math.hypot(x1 - x0, y1 - y0) / scenario.robot.v_max_mps + 10.0
+    wanted = 3.0 * math.hypot(x1 - x0, y1 - y0) / scenario.widest.v_max_mps + 10.0
     per_s = scenario.robots * scenario.lidar.rate_hz * (scenario.lidar.beams + 200)
     return float(f"{min(LIMIT_S.high, max(LIMIT_S.low, wanted), max(5.0, WORK / per_s)):.4g}")
 

@@ -33,21 +33,19 @@ class Breach(NamedTuple):
 
 
 class Allowed(NamedTuple):
-    """What a robot's data sheet and radio allow."""
+    """What time and radio allow."""
 
     dt: float
-    v_max: float
-    w_max: float
     bitrate_bps: float
     late_s: float
     """Time on the air beyond the time that has passed: the longest wait and packet [s]."""
 
 
 def _allowed(setting: Setting) -> Allowed:
-    radio, body = setting.radio, setting.rig.body
+    radio = setting.radio
     longest = 8.0 * (MAX_PACKET_BYTES + radio.overhead_bytes) / radio.bitrate_bps
     late = radio.max_wait_s + longest + SLACK
-    return Allowed(*map(float, (setting.dt, body.v_max_mps, body.w_max_radps, radio.bitrate_bps, late)))
+    return Allowed(*map(float, (setting.dt, radio.bitrate_bps, late)))
 
 
 class Counts(NamedTuple):
@@ -86,8 +84,8 @@ def look(robots: np.ndarray, decisions: np.ndarray, tick: int, may: Allowed, cou
                 counts.driving[0] += 1
                 counts.drove[0] = tick
         placed = math.isfinite(robot["x"]) and math.isfinite(robot["y"]) and math.isfinite(robot["yaw"])
-        sound = robot["v"] >= -SLACK and robot["v"] <= may.v_max + SLACK and robot["clearance"] >= 0.0
-        obeys = v >= 0.0 and v <= may.v_max + SLACK and abs(w) <= may.w_max + SLACK
+        sound = robot["v"] >= -SLACK and robot["v"] <= robot["v_max"] + SLACK and robot["clearance"] >= 0.0
+        obeys = v >= 0.0 and v <= robot["v_max"] + SLACK and abs(w) <= robot["w_max"] + SLACK
         quiet = 8.0 * robot["air_bytes"] / may.bitrate_bps <= there
         fine = fine and robot["crashed"] == 0 and placed and sound and obeys and quiet
     return not fine
@@ -143,11 +141,11 @@ class Watch:
         hit = np.flatnonzero(robots["crashed"])
         if not hit.size:
             return None
-        i, radius = int(hit[0]), float(self._setting.rig.body.radius_m)
+        i = int(hit[0])
         gaps = np.hypot(robots["x"] - robots["x"][i], robots["y"] - robots["y"][i])
         gaps[i] = math.inf
         j = int(np.argmin(gaps))
-        with_robot = bool(robots["crashed"][j]) and gaps[j] < 2.0 * radius + 0.01
+        with_robot = bool(robots["crashed"][j]) and gaps[j] < robots["radius"][i] + robots["radius"][j] + 0.01
         what = f"robot {j}" if with_robot else "the world"
         place = f"({robots['x'][i]:.3f}, {robots['y'][i]:.3f})"
         return "contact", i, f"robot {i} touched {what} at {place}"
@@ -155,7 +153,7 @@ class Watch:
     def _commands(self, sim: Sim) -> Found | None:
         v, w = sim.decisions["v"], sim.decisions["w"]
         fine = np.isfinite(v) & np.isfinite(w) & (v >= 0.0)
-        fine &= (v <= sim.v_max + SLACK) & (np.abs(w) <= sim.w_max + SLACK)
+        fine &= (v <= sim.robots["v_max"] + SLACK) & (np.abs(w) <= sim.robots["w_max"] + SLACK)
         bad = np.flatnonzero(~fine)
         if not bad.size:
             return None
@@ -164,7 +162,7 @@ class Watch:
 
     def _state(self, robots: np.ndarray) -> Found | None:
         poses = np.isfinite(robots["x"]) & np.isfinite(robots["y"]) & np.isfinite(robots["yaw"])
-        fine = poses & (robots["v"] >= -SLACK) & (robots["v"] <= self._setting.rig.body.v_max_mps + SLACK)
+        fine = poses & (robots["v"] >= -SLACK) & (robots["v"] <= robots["v_max"] + SLACK)
         bad = np.flatnonzero(~fine | ~(robots["clearance"] >= 0.0))
         if not bad.size:
             return None

@@ -4,6 +4,7 @@ scenarios."""
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -68,7 +69,11 @@ class Keeping(NamedTuple):
         )
 
 
-def check_setup(setup: Setup, radius: float, keeping: Keeping | None = None) -> None:
+Radii = float | Sequence[float]
+"""Of all robots, or of each [m]."""
+
+
+def check_setup(setup: Setup, radius: Radii, keeping: Keeping | None = None) -> None:
     """Raise an UnsolvableWorldError that names the robot and the reason, unless all can start and arrive.
 
     Checked, in this order: finite numbers; robots of ``radius`` [m] that overlap at the start or at the
@@ -76,19 +81,32 @@ def check_setup(setup: Setup, radius: float, keeping: Keeping | None = None) -> 
     to spare; and what a scenario's robots keep besides, if it is given (`check_keeping`).
     """
     check_places(setup, radius, keeping)
-    bad = unreachable(setup, Reach(radius))
-    if bad.size:
-        raise UnsolvableWorldError(
-            f"robot {int(bad[0])}: no way from its start to its goal for a robot of radius {radius:g} m "
-            f"(searched with {CLEARANCE_M:g} m to spare on a {RESOLUTION_M:g} m grid)"
-        )
+    for one, robots in _alike(setup, radius):
+        bad = robots[unreachable(_only(setup, robots), Reach(one))]
+        if bad.size:
+            raise UnsolvableWorldError(
+                f"robot {int(bad[0])}: no way from its start to its goal for a robot of radius {one:g} m "
+                f"(searched with {CLEARANCE_M:g} m to spare on a {RESOLUTION_M:g} m grid)"
+            )
     if keeping is not None:
         check_keeping(setup, radius, keeping)
 
 
-def check_places(setup: Setup, radius: float, keeping: Keeping | None = None) -> None:
+def _alike(setup: Setup, radius: Radii) -> Iterator[tuple[float, Ints]]:
+    """Return each radius that there is, and the robots that have it."""
+    radii = np.broadcast_to(np.asarray(radius, float), len(setup.starts))
+    for one in np.unique(radii).tolist():
+        yield one, np.flatnonzero(radii == one)
+
+
+def _only(setup: Setup, robots: Ints) -> Setup:
+    """Return the setup of some of its robots."""
+    return Setup(setup.world, setup.starts[robots], setup.goals[robots])
+
+
+def check_places(setup: Setup, radius: Radii, keeping: Keeping | None = None) -> None:
     """Raise an UnsolvableWorldError unless every robot can stand at its start and at its goal, as in `check_setup`."""
-    check_robots(len(setup.starts), radius)
+    check_robots(len(setup.starts), float(np.max(radius)))
     starts, goals = np.asarray(setup.starts, dtype=np.float64), np.asarray(setup.goals, dtype=np.float64)
     if starts.ndim != 2 or starts.shape[1] != 3 or goals.shape != (len(starts), 2):
         raise UnsolvableWorldError(
@@ -99,20 +117,31 @@ def check_places(setup: Setup, radius: float, keeping: Keeping | None = None) ->
     _check_apart("start", starts[:, :2], radius)
     _check_apart("goal", goals, radius)
     world = compile_world(setup.world)
-    _check_free("start", world, starts[:, :2], radius)
-    enough = "" if keeping is None else f"; {keeping.distance(radius)[0]:g} m would do"
-    _check_free("goal", world, goals, radius, enough)
+    for one, robots in _alike(setup, radius):
+        _check_free("start", world, starts[:, :2], robots, one)
+        enough = "" if keeping is None else f"; {keeping.distance(one)[0]:g} m would do"
+        _check_free("goal", world, goals, robots, one, enough)
 
 
-def check_keeping(setup: Setup, radius: float, keeping: Keeping) -> None:
+def check_keeping(setup: Setup, radius: Radii, keeping: Keeping) -> None:
     """Raise a ConfigError that names the key, unless robots that keep so far off things get to their goals.
 
     Of a setup that `check_setup` has passed. A robot that starts at its goal need not go there.
     """
     moves = np.hypot(*(setup.goals - setup.starts[:, :2]).T) > ARRIVE_M
+    for one, robots in _alike(setup, radius):
+        _check_goals_kept_off(setup, robots[moves[robots]], one, keeping)
+    parking = [keeping.spacing(float(one))[0] / 2.0 for one in np.broadcast_to(np.asarray(radius), len(setup.goals))]
+    _check_parking(setup.goals, moves, parking, keeping.spacing(float(np.max(radius)))[1])
+    for one, robots in _alike(setup, radius):
+        _check_ways_kept_off(setup, robots[moves[robots]], one, keeping)
+
+
+def _check_goals_kept_off(setup: Setup, robots: Ints, radius: float, keeping: Keeping) -> None:
+    """Raise a ConfigError unless the goals of these robots are as far from things as they keep."""
     distance, key = keeping.distance(radius)
     world = compile_world(setup.world)
-    for robot in np.flatnonzero(moves).tolist():
+    for robot in robots.tolist():
         x, y = setup.goals[robot].tolist()
         free = static_clearance(world, x, y, x, y, 2.0 * distance)
         if free < distance - TOLERANCE_M:
@@ -121,11 +150,14 @@ def check_keeping(setup: Setup, radius: float, keeping: Keeping) -> None:
                 f"robot {robot} cannot arrive: its goal ({x:.3f}, {y:.3f}) is {free:.3f} m from an obstacle, "
                 f"and with this value {distance:g} m would do",
             )
-    _check_parking(setup.goals, moves, *keeping.spacing(radius))
+
+
+def _check_ways_kept_off(setup: Setup, robots: Ints, radius: float, keeping: Keeping) -> None:
+    """Raise a ConfigError unless ways are as wide as these robots keep off things."""
+    distance, key = keeping.distance(radius)
     if distance + WOBBLE_M <= radius + CLEARANCE_M:
         return
-    bad = unreachable(setup, Reach(radius, distance + WOBBLE_M - radius, FINE_M))
-    bad = bad[moves[bad]]
+    bad = robots[unreachable(_only(setup, robots), Reach(radius, distance + WOBBLE_M - radius, FINE_M))]
     if bad.size:
         narrowest = 2.0 * (distance + WOBBLE_M + math.sqrt(0.5) * FINE_M)
         raise ConfigError(
@@ -135,14 +167,14 @@ def check_keeping(setup: Setup, radius: float, keeping: Keeping) -> None:
         )
 
 
-def _check_parking(goals: Floats, moves: NDArray[np.bool_], least: float, key: str) -> None:
-    close = _closest(goals, least - TOLERANCE_M, moves)
+def _check_parking(goals: Floats, moves: NDArray[np.bool_], halves: Sequence[float], key: str) -> None:
+    close = _closest(goals, np.array(halves) - 0.5 * TOLERANCE_M, moves)
     if close is not None:
         one, other, gap = close
         raise ConfigError(
             key,
             f"robots {one} and {other} cannot both arrive for certain: their goals are {gap:.3f} m apart, "
-            f"and with this value {least:g} m would do",
+            f"and with this value {halves[one] + halves[other]:g} m would do",
         )
 
 
@@ -189,33 +221,37 @@ def _check_finite(what: str, points: Floats) -> None:
         raise UnsolvableWorldError(f"robot {int(bad[0])}: its {what} {points[bad[0]].tolist()} is not finite")
 
 
-def _check_apart(what: str, points: Floats, radius: float) -> None:
-    close = _closest(points, 2.0 * radius, np.ones(len(points), dtype=np.bool_))
+def _check_apart(what: str, points: Floats, radius: Radii) -> None:
+    radii = np.broadcast_to(np.asarray(radius, float), len(points))
+    close = _closest(points, radii, np.ones(len(points), dtype=np.bool_))
     if close is not None:
         one, other, gap = close
         raise UnsolvableWorldError(
-            f"robots {one} and {other}: their {what}s are {gap:.3f} m apart, less than two radii ({2.0 * radius:g} m)"
+            f"robots {one} and {other}: their {what}s are {gap:.3f} m apart, less than two radii "
+            f"({radii[one] + radii[other]:g} m)"
         )
 
 
-def _closest(points: Floats, least: float, moves: NDArray[np.bool_]) -> tuple[int, int, float] | None:
-    """Return the first two robots with points closer than ``least`` [m] of which one ``moves``, and the distance.
+def _closest(points: Floats, halves: Floats, moves: NDArray[np.bool_]) -> tuple[int, int, float] | None:
+    """Return the first two robots with points closer than their ``halves`` [m] together of which one ``moves``, and the
+    distance.
 
-    Neighbours are in bins of that side.
+    Neighbours are in bins of the side that is the largest of these sums.
     """
     bins: dict[tuple[int, int], list[int]] = {}
-    for robot, (column, row) in enumerate(np.floor(points / least).astype(np.int64).tolist()):
+    for robot, (column, row) in enumerate(np.floor(points / (2.0 * halves.max())).astype(np.int64).tolist()):
         for near in ((column + i, row + j) for i in (-1, 0, 1) for j in (-1, 0, 1)):
             for other in bins.get(near, []):
                 gap = float(np.hypot(*(points[robot] - points[other])))
-                if gap < least and (moves[robot] or moves[other]):
+                if gap < halves[robot] + halves[other] and (moves[robot] or moves[other]):
                     return other, robot, gap
         bins.setdefault((column, row), []).append(robot)
     return None
 
 
-def _check_free(what: str, world: World, points: Floats, radius: float, enough: str = "") -> None:
-    for robot, (x, y) in enumerate(points.tolist()):
+def _check_free(what: str, world: World, points: Floats, robots: Ints, radius: float, enough: str = "") -> None:
+    for robot in robots.tolist():
+        x, y = points[robot].tolist()
         if static_clearance(world, x, y, x, y, 2.0 * radius) <= radius:
             raise UnsolvableWorldError(
                 f"robot {robot}: its {what} ({x:.3f}, {y:.3f}) is in an obstacle or closer to one "

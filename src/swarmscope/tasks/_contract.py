@@ -40,6 +40,7 @@ class Setup:
     world: WorldSpec
     starts: NDArray[np.float64]  # (N, 3) x [m], y [m], yaw [rad]
     goals: NDArray[np.float64]  # (N, 2) x, y [m]
+    goal_yaws: NDArray[np.float64] | None = None  # (N,) headings wanted there [rad], NaN where any will do
 
 
 class Task(Protocol):

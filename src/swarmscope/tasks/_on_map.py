@@ -41,7 +41,9 @@ class Wanted(NamedTuple):
     starts: Sequence[Sequence[float] | None] = ()
     """Those that are given, in the order of the robots: x, y or x, y, yaw [m, m, rad]; None is drawn."""
     goals: Sequence[Sequence[float] | None] = ()
-    """In the same way: x, y [m]."""
+    """In the same way; yaw is a heading to turn to."""
+    radii: Sequence[float] = ()
+    """Of each robot [m], where they differ; ``radius`` is the largest."""
 
 
 def place_on_map(spec: WorldSpec, seed: int, robots: int, radius: float, min_distance: float) -> Setup:
@@ -63,15 +65,17 @@ def place_wanted(spec: WorldSpec, wanted: Wanted) -> Setup:
     if None in starts or None in goals:
         _draw_missing(spec, wanted, starts, goals)
     points = np.array([start[:2] for start in starts if start is not None])
-    goal_points = np.array([goal for goal in goals if goal is not None])
+    goal_points = np.array([goal[:2] for goal in goals if goal is not None])
+    turns = np.array([goal[2] if goal is not None and len(goal) > 2 else np.nan for goal in goals])
     ahead = goal_points - points
     yaw = np.arctan2(ahead[:, 1], ahead[:, 0])
     for robot, start in enumerate(starts):
         if start is not None and len(start) > 2:
             yaw[robot] = start[2]
-    setup = Setup(spec, np.column_stack([points, yaw]), goal_points)
+    goal_yaws = turns if np.isfinite(turns).any() else None
+    setup = Setup(spec, np.column_stack([points, yaw]), goal_points, goal_yaws)
     if wanted.starts or wanted.goals:
-        check_setup(setup, radius)
+        check_setup(setup, wanted.radii or radius)
     else:
         check_places(setup, radius)
     return setup
@@ -90,12 +94,13 @@ def _check_given(spec: WorldSpec, wanted: Wanted) -> None:
             if place is None:
                 continue
             x, y, where = place[0], place[1], f"map.{key}[{robot}]"
+            radius = wanted.radii[robot] if wanted.radii else wanted.radius
             if not (x0 <= x <= x1 and y0 <= y <= y1):
                 box = f"[{x0:g}, {x1:g}] x [{y0:g}, {y1:g}] m"
                 raise ConfigError(where, f"({x:g}, {y:g}) is off the map, which covers {box}")
-            free = static_clearance(world, x, y, x, y, 2.0 * wanted.radius)
-            if free <= wanted.radius:
-                why = f"({x:g}, {y:g}) is {free:.3f} m from something solid; a robot of radius {wanted.radius:g} m"
+            free = static_clearance(world, x, y, x, y, 2.0 * radius)
+            if free <= radius:
+                why = f"({x:g}, {y:g}) is {free:.3f} m from something solid; a robot of radius {radius:g} m"
                 raise ConfigError(where, f"{why} needs more: move it, or make the robot smaller")
 
 

@@ -28,6 +28,7 @@ class RobotEntry(BaseModel):
 
     id: int
     radius: Length
+    goal_yaw: Number | None = None
     start: tuple[Number, Number, Number]
     goal: Point
 

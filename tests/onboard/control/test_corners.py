@@ -102,7 +102,7 @@ def hidden(ranges, n, side, rig=None, broken=()):
     rows = one_robot(rig or rig_of())
     rows.view.scan[:] = ranges
     rows.view.unseen[list(broken)] = BROKEN
-    return hidden_at(rows.view, n, side, FAR)
+    return hidden_at(rows.view, n, side, rows.rig.body.radius_m, FAR)
 
 
 def test_behind_a_wall_across_a_body_is_hidden_as_soon_as_it_is_behind_the_wall():
@@ -131,11 +131,11 @@ def test_out_of_view_an_open_beam_shows_nothing():
     ranges = np.full(360, np.inf, np.float32)
     ranges[265:290] = 0.5  # at the left edge of the view, the end of a wall, and what old scans show of it
     rows.view.scan[:] = ranges
-    whole = hidden_at(rows.view, 265, -1, FAR)
+    whole = hidden_at(rows.view, 265, -1, rows.rig.body.radius_m, FAR)
     rows.view.scan[[271, 275]] = np.inf
-    assert hidden_at(rows.view, 265, -1, FAR) == whole < 1.5
+    assert hidden_at(rows.view, 265, -1, rows.rig.body.radius_m, FAR) == whole < 1.5
     rows.view.scan[267] = np.inf
-    assert hidden_at(rows.view, 265, -1, FAR) > 2.0
+    assert hidden_at(rows.view, 265, -1, rows.rig.body.radius_m, FAR) > 2.0
 
 
 def test_behind_a_wall_along_a_body_is_hidden_beside_its_near_end():

@@ -1,4 +1,4 @@
-"""Robots that nobody sees yet: whether a way keeps to its half of every place from which one could come into view.
+"""Robots that nobody sees yet: whether a way leaves room for one at every place from which it could come.
 
 Behind the edge of a thing there may be a robot, where its whole body is hidden. The nearest such place at an edge is
 looked for in the scan; the rule between two robots (docs/safety.md) then holds for a body there as for one in view.
@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from swarmscope._jit import jit_inline, jit_inner
-from swarmscope.onboard.control.halves import leaves_half
+from swarmscope.onboard.control.halves import Others, leaves_half, met_by
 from swarmscope.onboard.control.way import Way
 from swarmscope.onboard.perception.beams import beam_at
 from swarmscope.onboard.rig import SIGMAS, Rig
@@ -49,40 +49,70 @@ class Round(NamedTuple):
 
 
 @jit_inline
-def matters_up_to(way: Way, met: float, rig: Rig) -> float:
-    """Return from how far along a line of sight on robots do not matter for a way [m], measured from this robot.
-
-    ``met`` [m]: how far one that does not yield comes until this robot stands.
-    """
-    most = math.sqrt(way.x5 * way.x5 + way.y5 * way.y5) + way.brake
-    return apart_round(rig) + max(2.0 * most, most + met)
+def other_robots(v: float, dt: float, rig: Rig) -> Others:
+    """Return what there is to know of other robots for one that is to drive at ``v`` [m/s]."""
+    guarding = rig.guarding
+    met = 0.0 if guarding.others_yield else met_by(guarding.others_mps, v, dt, rig)
+    return Others(guarding.others_smallest_m, _kept_off(rig), apart_round(rig), guarding.others_yield, met)
 
 
 @jit_inline
-def out_of_hidden_halves(see: View, n: int, way: Way, met: float, enough: float) -> bool:
-    """Tell whether a way keeps out of the half of every robot that may be hidden past the return of beam n.
+def strangers(v: float, dt: float, rig: Rig) -> Others:
+    """Return the same of those that are no robots and do not yield: they may rub against a corner."""
+    radius, own = rig.guarding.strangers_m, rig.body.radius_m + rig.guarding.clearance_m
+    near = min(own, radius)
+    touch = touch_round(own, radius, rig.body.radius_m + radius, near)
+    return Others(radius, near, touch, False, met_by(rig.guarding.strangers_mps, v, dt, rig))
 
-    ``met`` and ``enough`` [m] as in `matters_up_to`.
+
+@jit_inline
+def matters_up_to(way: Way, others: Others) -> float:
+    """Return from how far along a line of sight on others do not matter for a way [m], measured from this robot."""
+    most = math.sqrt(way.x5 * way.x5 + way.y5 * way.y5) + way.brake
+    return others.touch + max(2.0 * most, most + others.met)
+
+
+@jit_inline
+def out_of_hidden_halves(see: View, n: int, way: Way, others: Others, enough: float) -> bool:
+    """Tell whether a way leaves room for all who may be hidden past the return of beam n, as they matter.
+
+    ``enough`` [m] as in `matters_up_to`.
     """
     if _nearer(see.rig) * see.scan[n] >= enough:
         return True
-    return _clear_past(see, n, 1, way, met, enough) and _clear_past(see, n, -1, way, met, enough)
+    return _clear_past(see, n, 1, way, others, enough) and _clear_past(see, n, -1, way, others, enough)
 
 
 @jit_inline
 def _kept_off(rig: Rig) -> float:
-    """Return what the centres of robots keep off a corner [m]: those that do not yield may rub against it."""
-    return rig.body.radius_m + (rig.guarding.clearance_m if rig.guarding.others_yield else 0.0)
+    """Return what the centres of all robots keep off a corner [m]: those that do not yield may rub against it."""
+    return rig.guarding.others_smallest_m + (rig.guarding.clearance_m if rig.guarding.others_yield else 0.0)
 
 
 @jit_inline
 def apart_round(rig: Rig) -> float:
     """Return from which distance on two robots do not touch, measured round a corner that both keep off [m].
 
-    Bodies that touch lie at the ends of a chord of the circle that both keep off.
+    Bodies that touch lie at the ends of a chord of the circle that both keep off. Where radii differ each keeps
+    off what suits its own, and lengths are those round what suits the smallest.
     """
-    keeps = _kept_off(rig)
-    return 2.0 * keeps * math.asin(rig.body.radius_m / keeps)
+    keeps, own, smallest = _kept_off(rig), rig.body.radius_m, rig.guarding.others_smallest_m
+    if smallest == own and smallest == rig.guarding.others_largest_m:
+        return 2.0 * keeps * math.asin(own / keeps)
+    spare = keeps - smallest
+    small, large = smallest + spare, rig.guarding.others_largest_m + spare
+    nearest = touch_round(own + spare, small, own + smallest, keeps)
+    return max(nearest, touch_round(own + spare, large, own + rig.guarding.others_largest_m, keeps))
+
+
+@jit_inline
+def touch_round(p: float, q: float, apart: float, near: float) -> float:
+    """Return the way round a disc of radius ``near`` between points ``p`` and ``q`` off its middle, ``apart`` [m]."""
+    turn = math.acos(min(1.0, max(-1.0, (p * p + q * q - apart * apart) / (2.0 * p * q))))
+    arc = turn - math.acos(near / p) - math.acos(near / q)
+    if arc <= 0.0:
+        return apart
+    return math.sqrt(p * p - near * near) + math.sqrt(q * q - near * near) + near * arc
 
 
 @jit_inline
@@ -92,8 +122,8 @@ def _nearer(rig: Rig) -> float:
 
 
 @jit_inner
-def _opens(ranges: np.ndarray, n: int, side: int, rig: Rig) -> bool:
-    """Tell whether a robot has room between the return of beam n and that of the next one on a side, farther away."""
+def _opens(ranges: np.ndarray, n: int, side: int, width: float, rig: Rig) -> bool:
+    """Tell whether what is so wide [m] has room between beam n's return and that of the next beam, farther away."""
     m = beam_at(n + side, rig.sensor)
     if m < 0 or not ranges[m] > ranges[n]:
         return False
@@ -101,32 +131,30 @@ def _opens(ranges: np.ndarray, n: int, side: int, rig: Rig) -> bool:
     if not far < rig.sensor.range_max:
         return True
     near = ranges[n] * (1.0 - SIGMAS * rig.sensor.range_sigma)
-    wanted = 2.0 * (rig.body.radius_m + rig.guarding.clearance_m)
-    if far - near + near * rig.sensor.increment < wanted:
+    if far - near + near * rig.sensor.increment < width:
         return False  # nearly always
     gap2 = near * near + far * far - 2.0 * near * far * math.cos(rig.sensor.increment)
-    return bool(gap2 >= wanted * wanted)
+    return bool(gap2 >= width * width)
 
 
 @jit_inner
-def _clear_past(see: View, n: int, side: int, way: Way, met: float, enough: float) -> bool:
-    """Apply the rule between two robots to a body hidden past the return of beam n on a side, if it opens there.
+def _clear_past(see: View, n: int, side: int, way: Way, others: Others, enough: float) -> bool:
+    """Apply the rule before others to a body hidden past the return of beam n on a side, if it opens there.
 
     Both have to go round the corner, so lengths are those of ways round it.
     """
-    rig, radius = see.rig, see.rig.body.radius_m
-    if not _opens(see.scan, n, side, rig):
+    rig, radius = see.rig, others.smallest
+    if not _opens(see.scan, n, side, 2.0 * (radius + (rig.guarding.clearance_m if others.yield_ else 0.0)), rig):
         return True
-    keeps, touch = _kept_off(rig), apart_round(rig)
-    along = hidden_at(see, n, side, enough)
+    along = hidden_at(see, n, side, radius, enough)
     if along >= enough:
         return True
     m, near, turned = beam_at(n + side, rig.sensor), _nearer(rig) * see.scan[n], rig.sensor.increment
-    corner = Corner(rig.cos[m], rig.sin[m], float(side), near * math.cos(turned), near * math.sin(turned), keeps)
-    along = max(along, corner.x + keeps)  # there it is the shortest way
+    corner = Corner(rig.cos[m], rig.sin[m], float(side), near * math.cos(turned), near * math.sin(turned), others.keeps)
+    along = max(along, corner.x + others.keeps)  # there it is the shortest way
     past = way_round(along, radius, corner)
     moved, stopped = come_along(way.x4, way.y4, past, corner), come_along(way.x5, way.y5, past, corner)
-    return leaves_half(moved, stopped, met, past.length - touch, rig)
+    return leaves_half(moved, stopped, past.length - others.touch, others)
 
 
 @jit_inline
@@ -170,14 +198,16 @@ def come_along(qx: float, qy: float, way: Round, corner: Corner) -> float:
 
 
 @jit_inline
-def hidden_at(see: View, n: int, side: int, enough: float) -> float:
+def hidden_at(see: View, n: int, side: int, radius: float, enough: float) -> float:
     """Return how far along the line of sight past an edge the centre of a body is that touches it and is hidden [m].
+
+    ``radius`` is the body's [m].
 
     Beams that the body would cross have to end before it, those at least that show where they end. Beyond ``enough``
     [m] it does not matter.
     """
     rig, ranges = see.rig, see.scan
-    radius, increment = rig.body.radius_m, rig.sensor.increment
+    increment = rig.sensor.increment
     nearer = _nearer(rig)
     along: float = nearer * ranges[n]
     c1, s1 = math.cos(increment), math.sin(increment)

@@ -16,8 +16,8 @@ from typing import NamedTuple
 import numpy as np
 
 from swarmscope._jit import jit, jit_inline, jit_inner
-from swarmscope.onboard.control.corners import apart_round, matters_up_to, out_of_hidden_halves
-from swarmscope.onboard.control.halves import in_own_half, met_by
+from swarmscope.onboard.control.corners import apart_round, matters_up_to, other_robots, out_of_hidden_halves, strangers
+from swarmscope.onboard.control.halves import Others, leaves_room, met_by
 from swarmscope.onboard.control.horizon import horizon_speed
 from swarmscope.onboard.control.unseen import look_round, out_of_sight, reaches_between
 from swarmscope.onboard.control.way import STEPS, Way, closer, shadowed, way_of
@@ -25,16 +25,18 @@ from swarmscope.onboard.percept import MAX_NEIGHBOURS, PEERS, Row
 from swarmscope.onboard.perception.frames import is_blurred
 from swarmscope.onboard.perception.holes import nothing_up_to
 from swarmscope.onboard.perception.mend import body_and_clearance, least_range
+from swarmscope.onboard.perception.standing import STANDS
 from swarmscope.onboard.reasons import (
     R_HELD_BLIND,
     R_HELD_CORNER,
     R_HELD_NO_NUMBER,
     R_HELD_ROBOT,
+    R_HELD_STRANGER,
     R_HELD_THING,
     R_HELD_UNSEEN,
 )
 from swarmscope.onboard.rig import ROUNDING_M, SIGMAS, Rig
-from swarmscope.onboard.sharing.tracks import near_track, returns_of
+from swarmscope.onboard.sharing.tracks import near_track, on_track, returns_of
 from swarmscope.onboard.view import BROKEN, View
 
 FRACTIONS = (1.0, 0.8, 0.6, 0.4, 0.2, 0.1, 0.05, 0.0)
@@ -132,7 +134,7 @@ def _measure_gaps(see: View) -> None:
         if shared["track_id"][t] < 0:
             continue
         d = math.sqrt(shared["track_x"][t] ** 2 + shared["track_y"][t] ** 2)
-        surface = d - rig.body.radius_m
+        surface = d - shared["track_radius"][t]
         least = surface - sigma * d
         if sigma > 0.0:
             shown = returns_of(see, t, False)
@@ -146,8 +148,13 @@ def speed_of_horizon(rig: Rig, dt: float) -> float:
     """Return the largest speed [m/s] that the longest view allows with a decision every ``dt`` [s]."""
     guarding, taken = rig.guarding, rig.body.radius_m + rig.guarding.clearance_m
     robots = rig.horizon.robots - taken if guarding.others_mps > 0.0 else math.inf
-    stranger = 0.0 if guarding.others_yield else guarding.others_mps
-    return horizon_speed(rig.horizon.things - taken, robots, dt + guarding.latency_s, rig.body.a_max_mps2, stranger)
+    stranger, things, delay = 0.0 if guarding.others_yield else guarding.others_mps, rig.horizon.things - taken, dt
+    delay += guarding.latency_s
+    speed = horizon_speed(things, robots, delay, rig.body.a_max_mps2, stranger)
+    if not guarding.strangers_mps > 0.0:
+        return speed
+    free = rig.horizon.strangers - taken
+    return min(speed, horizon_speed(things, free, delay, rig.body.a_max_mps2, guarding.strangers_mps))
 
 
 @jit_inner
@@ -159,8 +166,12 @@ def _near(see: View, speed: float) -> Near:
     way, brake = speed * delay, speed * speed / (2.0 * body.a_max_mps2)
     limit = body.radius_m + guarding.clearance_m + _bulge(speed, body.w_max_radps, see) + way + brake
     if guarding.others_mps > 0.0:
-        stranger = 0.0 if guarding.others_yield else guarding.others_mps * (delay + speed / body.a_max_mps2)
-        limit = max(limit, apart_round(rig) - body.radius_m + way + brake) + max(way + 3.0 * brake, stranger)
+        stranger = 0.0 if guarding.others_yield else met_by(guarding.others_mps, speed, see.percept["dt_s"], rig)
+        hidden = apart_round(rig) - guarding.others_smallest_m + way + brake
+        limit = max(limit, hidden) + max(way + 3.0 * brake, stranger)
+    if guarding.strangers_mps > 0.0:
+        others = strangers(speed, see.percept["dt_s"], rig)
+        limit = max(limit, max(others.touch, body.radius_m + guarding.clearance_m) + way + brake + others.met)
     limit /= max(0.5, 1.0 - SIGMAS * rig.sensor.range_sigma - rig.sensor.increment)
     least, far = least_range(rig), np.float32(limit + ROUNDING_M)
     count = 0
@@ -185,19 +196,20 @@ def _held_by(see: View, v: float, w: float, near: Near) -> int:
     way = way_of(speed, v, w, see)
     if way.x5 * way.x5 + way.y5 * way.y5 + way.brake < 1e-10 and speed < STANDS_MPS:
         return FREE
-    alone = not rig.guarding.others_mps > 0.0
-    met = met_by(v, percept["dt_s"], rig)
-    if not alone and not _clear_of_tracks(see, way, met):
+    others = other_robots(v, percept["dt_s"], rig)
+    if rig.guarding.others_mps > 0.0 and not _clear_of_tracks(see, way, others):
         return R_HELD_ROBOT
-    bulge, enough = _bulge(v, w, see), matters_up_to(way, met, rig)
+    bulge, enough = _bulge(v, w, see), matters_up_to(way, others)
     for k in range(near.beams):
         n = int(see.edges[k])
-        held = _held_by_beam(see, n, way, met, bulge, enough)
+        held = _held_by_beam(see, n, way, others, bulge, enough)
         if held == R_HELD_THING and rig.sensor.field > 0 and is_blurred(see, n):
             see.shared["unseen_left"] = rig.sin[n] > 0.0
             return R_HELD_UNSEEN
         if held != FREE:
             return held
+    if rig.guarding.strangers_mps > 0.0:  # such robots see all round
+        return R_HELD_STRANGER if _held_by_strangers(see, v, way, near) else FREE
     if rig.sensor.field > 0:
         kept, _ = _kept_from(rig.body.radius_m, bulge, rig)
         front = kept + reaches_between(rig.body.radius_m)
@@ -229,7 +241,7 @@ def _kept_from(s: float, bulge: float, rig: Rig) -> tuple[float, float]:
 
 
 @jit_inner
-def _held_by_beam(see: View, n: int, way: Way, met: float, bulge: float, enough: float) -> int:
+def _held_by_beam(see: View, n: int, way: Way, others: Others, bulge: float, enough: float) -> int:
     """Return how the return of beam n, or who may come out from behind it, forbids a way: FREE, or the reason."""
     rig, percept, s = see.rig, see.percept, see.scan[n]
     if not s >= least_range(rig):
@@ -245,11 +257,44 @@ def _held_by_beam(see: View, n: int, way: Way, met: float, bulge: float, enough:
         return R_HELD_THING
     if not rig.guarding.others_mps > 0.0:
         return FREE
-    if not in_own_half(px, py, s, way, met, rig) and (
+    if not leaves_room(px, py, s, way, others, rig) and (
         s > _listed_up_to(percept, rig) or near_track(percept, see.shared, px, py, rig)
     ):
         return R_HELD_ROBOT
-    return FREE if out_of_hidden_halves(see, n, way, met, enough) else R_HELD_CORNER
+    return FREE if out_of_hidden_halves(see, n, way, others, enough) else R_HELD_CORNER
+
+
+@jit
+def _held_by_strangers(see: View, v: float, way: Way, near: Near) -> bool:
+    """Tell whether somebody who does not yield could reach a robot that takes this way before it stands.
+
+    Whoever comes is a return that does not stand and is no robot's, or is hidden behind one.
+    """
+    rig, coming = see.rig, strangers(v, see.percept["dt_s"], see.rig)
+    enough, least = matters_up_to(way, coming), least_range(rig)
+    for k in range(near.beams):
+        n = int(see.edges[k])
+        s = float(see.scan[n])
+        if not s >= least:
+            return True
+        if not s < rig.sensor.range_max:
+            continue
+        s *= max(0.5, 1.0 - SIGMAS * rig.sensor.range_sigma)
+        px, py = s * rig.cos[n], s * rig.sin[n]
+        comes = see.standing[n] != STANDS and not leaves_room(px, py, s, way, coming, rig)
+        if comes and not _is_robots(see, px, py):
+            return True
+        if not out_of_hidden_halves(see, n, way, coming, enough):
+            return True
+    return False
+
+
+@jit_inner
+def _is_robots(see: View, px: float, py: float) -> bool:
+    """Tell whether the return at (px, py), body frame, is a robot's; where positions err, whether it may be."""
+    if see.rig.sensor.position_sigma > 0.0 or see.rig.guarding.latency_s > 0.0:
+        return bool(near_track(see.percept, see.shared, px, py, see.rig))
+    return bool(on_track(see.percept, see.shared, px, py, see.rig))
 
 
 @jit_inline
@@ -258,11 +303,12 @@ def _listed_up_to(percept: Row, rig: Rig) -> float:
     k = MAX_NEIGHBOURS - 1
     if percept["n_neighbours"] < MAX_NEIGHBOURS:
         return math.inf
-    return math.sqrt(percept["neighbour_x"][k] ** 2 + percept["neighbour_y"][k] ** 2) - 1.5 * rig.body.radius_m
+    farthest = math.sqrt(percept["neighbour_x"][k] ** 2 + percept["neighbour_y"][k] ** 2)
+    return farthest - 1.5 * rig.guarding.others_largest_m
 
 
 @jit_inner
-def _clear_of_tracks(see: View, way: Way, met: float) -> bool:
+def _clear_of_tracks(see: View, way: Way, others: Others) -> bool:
     """Apply the half-gap rule to every tracked neighbour, seen now or remembered."""
     percept, shared, rig = see.percept, see.shared, see.rig
     c, s = math.cos(percept["compass"]), math.sin(percept["compass"])
@@ -276,6 +322,6 @@ def _clear_of_tracks(see: View, way: Way, met: float) -> bool:
             return False
         surface = max(see.other.distances[t], 1e-6)
         scale = surface / d
-        if not in_own_half(x * scale, y * scale, surface, way, met, rig):
+        if not leaves_room(x * scale, y * scale, surface, way, others, rig):
             return False
     return True

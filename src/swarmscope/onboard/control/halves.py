@@ -1,44 +1,59 @@
-"""The rule between two robots: each keeps to its half of the gap between them (docs/safety.md)."""
+"""The rules between a robot and whoever else moves: halves of the gap, or standing in time (docs/safety.md)."""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 from swarmscope._jit import jit_inline
 from swarmscope.onboard.control.way import Way
 from swarmscope.onboard.rig import Rig
 
 
-@jit_inline
-def met_by(v: float, dt: float, rig: Rig) -> float:
-    """Return how far one that does not yield comes until a robot that drives at ``v`` [m/s] stands [m]; others 0."""
-    if rig.guarding.others_yield:
-        return 0.0
-    return rig.guarding.others_mps * (dt + rig.guarding.latency_s + v / rig.body.a_max_mps2)
+class Others(NamedTuple):
+    """Who may come, and the rule that holds before them."""
+
+    smallest: float
+    """Radius of the smallest of them [m]."""
+    keeps: float
+    """What the centres of them and of this robot keep off a corner [m]."""
+    touch: float
+    """From which distance on two bodies do not touch, measured round a corner [m]."""
+    yield_: bool
+    """Whether they keep to their half."""
+    met: float
+    """How far one that does not yield comes until this robot stands [m]."""
 
 
 @jit_inline
-def in_own_half(px: float, py: float, s: float, way: Way, met: float, rig: Rig) -> bool:
-    """Tell whether a way keeps to its half of the gap to (px, py); its braking counts twice.
+def met_by(speed: float, v: float, dt: float, rig: Rig) -> float:
+    """Return how far one that does not yield, at ``speed`` [m/s], comes until a robot that drives at ``v`` stands."""
+    return speed * (dt + rig.guarding.latency_s + v / rig.body.a_max_mps2)
 
-    (px, py) is the nearest known point of a neighbour's body at range ``s``. Before one that does not yield the robot
-    stands before it is reached.
+
+@jit_inline
+def leaves_room(px: float, py: float, s: float, way: Way, others: Others, rig: Rig) -> bool:
+    """Tell whether a way leaves another its half of the gap to (px, py), or ends before one that does not yield comes.
+
+    (px, py) is the nearest known point of its body at range ``s``.
     """
     if s <= 1e-6:
         return way.x5 * way.x5 + way.y5 * way.y5 < 1e-9
     nx, ny = px / s, py / s
     moved = way.x4 * nx + way.y4 * ny
     stopped = way.x5 * nx + way.y5 * ny
-    return leaves_half(moved, stopped, met, s - rig.body.radius_m - rig.guarding.clearance_m, rig)
+    return leaves_half(moved, stopped, s - rig.body.radius_m - rig.guarding.clearance_m, others)
 
 
 @jit_inline
-def leaves_half(moved: float, stopped: float, met: float, free: float, rig: Rig) -> bool:
-    """Tell whether a way leaves another robot its half of what is ``free`` between the two [m].
+def leaves_half(moved: float, stopped: float, free: float, others: Others) -> bool:
+    """Tell whether a way leaves another robot its half of what is ``free`` between the two [m]; braking counts twice.
 
-    It has come nearer by ``moved`` at the next tick and by ``stopped`` when it stands; ``met`` as in `met_by`.
+    It has come nearer by ``moved`` at the next tick and by ``stopped`` when it stands. Before one that does not yield
+    the robot stands before it is reached, and a robot that drives away from it would be caught up with.
     """
     towards = max(moved, stopped)
+    if not others.yield_:
+        return towards + others.met <= free
     if towards <= 1e-6:
         return True
-    if rig.guarding.others_yield:
-        return towards + max(0.0, stopped - moved) <= 0.5 * free
-    return towards + met <= free
+    return towards + max(0.0, stopped - moved) <= 0.5 * free

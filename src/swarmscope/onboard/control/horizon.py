@@ -6,7 +6,6 @@ import math
 from typing import NamedTuple
 
 from swarmscope._jit import jit, jit_inline
-from swarmscope.onboard.body import Body
 from swarmscope.onboard.sensor import Sensor
 
 
@@ -16,17 +15,24 @@ class Horizon(NamedTuple):
     things: float
     """Standing ones that are as narrow as ``Guarding.thinnest_m``."""
     robots: float
-    """Robots of this kind."""
+    """Other robots, the smallest of them."""
+    strangers: float
+    """Those that do not yield, the smallest of them."""
 
 
-def horizon_of(body: Body, sensor: Sensor, thinnest_m: float) -> Horizon:
-    """Return the horizon of a sensor: its range, or nearer where something fits between two beams."""
+def horizon_of(smallest_m: float, strangers_m: float, sensor: Sensor, thinnest_m: float) -> Horizon:
+    """Return the horizon of a sensor: its range, or nearer where something fits between two beams.
+
+    ``smallest_m`` and ``strangers_m`` are the radii of the smallest other robot, and of the smallest that does not
+    yield [m].
+    """
     if sensor.increment >= math.pi:
-        return Horizon(0.0, 0.0)
+        return Horizon(0.0, 0.0, 0.0)
     between = 2.0 * math.sin(0.5 * sensor.increment)
     things = thinnest_m / between if thinnest_m > 0.0 else math.inf
-    robots = 2.0 * body.radius_m / between - body.radius_m
-    return Horizon(min(sensor.range_max, things), min(sensor.range_max, robots))
+    robots = 2.0 * smallest_m / between - smallest_m
+    strangers = 2.0 * strangers_m / between - strangers_m
+    return Horizon(*(min(sensor.range_max, reach) for reach in (things, robots, strangers)))
 
 
 @jit_inline

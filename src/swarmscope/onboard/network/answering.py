@@ -52,7 +52,7 @@ def look(i: int, swarm: Swarm, codes: np.ndarray) -> None:
     encode_scan(swarm.scans[i], codes)
     for k in range(percept["n_neighbours"]):
         x, y = percept["neighbour_x"][k], percept["neighbour_y"][k]
-        hide_robot(codes, rig.sensor, x, y, rig.body.radius_m)
+        hide_robot(codes, rig.sensor, x, y, rig.guarding.others_largest_m)
 
 
 @jit

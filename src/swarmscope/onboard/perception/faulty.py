@@ -59,4 +59,4 @@ def _one_surface(a: float, b: float, apart: int, rig: Rig) -> bool:
     near, far = min(a, b), max(a, b)
     if not (far < WITHIN * rig.sensor.range_max and far - near < ALIKE * near):
         return False
-    return bool(apart * rig.sensor.increment * near < 2.0 * rig.body.radius_m)
+    return bool(apart * rig.sensor.increment * near < 2.0 * rig.guarding.others_smallest_m)

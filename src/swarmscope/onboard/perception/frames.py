@@ -48,7 +48,7 @@ def look_back(see: View) -> None:
     for n in range(sensor.beams):
         if not first <= n <= last:
             see.scan[n] = math.inf
-    _move_on(see.percept, see.frames.poses)
+    move_poses(see.percept, see.frames.poses)
     for k in range(shared["frames_n"]):
         _draw(see, see.frames.scans[k], see.frames.poses[k])
     for t in range(PEERS):
@@ -56,8 +56,8 @@ def look_back(see: View) -> None:
             _draw_neighbour(see, t)
 
 
-@jit_inner
-def _move_on(percept: Row, poses: np.ndarray) -> None:
+@jit_inline
+def move_poses(percept: Row, poses: np.ndarray) -> None:
     """Express where scans were taken in the body frame of now."""
     here = (percept["odom_x"], percept["odom_y"], percept["odom_yaw"])
     way = math.sqrt(here[0] ** 2 + here[1] ** 2)
@@ -137,7 +137,8 @@ def _draw(see: View, scan: np.ndarray, pose: np.ndarray) -> None:
 @jit_inner
 def _draw_neighbour(see: View, t: int) -> None:
     """Lower the beams out of view that would meet the neighbour of track ``t``."""
-    sensor, shared, radius = see.rig.sensor, see.shared, see.rig.body.radius_m
+    sensor, shared = see.rig.sensor, see.shared
+    radius = shared["track_radius"][t]
     x, y = shared["track_x"][t], shared["track_y"][t]
     d = math.sqrt(x * x + y * y)
     if not radius < d < sensor.range_max:

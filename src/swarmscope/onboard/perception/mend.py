@@ -82,7 +82,7 @@ def _behind(ranges: np.ndarray, k: int, stop: int, rig: Rig) -> float:
     width = (stop - k + 1) * rig.sensor.increment
     if width >= math.pi or (rig.sensor.range_min > touching and width * rig.sensor.range_min > rig.guarding.thinnest_m):
         return touching  # beyond the body something may stand too near to be measured
-    fits = rig.body.radius_m / math.sin(0.5 * width) - rig.body.radius_m
+    fits = rig.guarding.others_smallest_m / math.sin(0.5 * width) - rig.guarding.others_smallest_m
     beside = min(float(ranges[(k - 1) % total]), float(ranges[stop % total]))
     if beside < NEAR_BODIES * touching:
         beside *= 1.0 - 0.5 * (stop - k) * rig.sensor.increment  # a corner of a right angle, in the hole

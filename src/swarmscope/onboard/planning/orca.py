@@ -209,7 +209,7 @@ def _neighbours(see: View, memory: Row, still_s: float) -> None:
             continue
         x, y = shared["track_x"][t], shared["track_y"][t]
         memory["others"][count, 0, 0], memory["others"][count, 0, 1] = c * x + s * y, c * y - s * x
-        memory["radii"][count] = rig.body.radius_m + rig.sensor.position_sigma * math.sqrt(x * x + y * y)
+        memory["radii"][count] = shared["track_radius"][t] + rig.sensor.position_sigma * math.sqrt(x * x + y * y)
         x, y = shared["track_vx"][t], shared["track_vy"][t]
         memory["others"][count, 1, 0], memory["others"][count, 1, 1] = c * x + s * y, c * y - s * x
         count += 1

@@ -12,6 +12,8 @@ from swarmscope.onboard.percept import PEERS, Row
 from swarmscope.onboard.rig import SIGMAS, Rig
 from swarmscope.onboard.view import GUARD_ALONE, View
 
+BESIDE_M = 0.06
+"""Returns so far outside a neighbour's body may belong to it."""
 SKIN_M = 0.01
 """What lies no farther outside a neighbour's body is the body."""
 EXACT = (1.0, 0.7)
@@ -68,6 +70,7 @@ def update_tracks(percept: Row, shared: Row, rig: Rig, dx: float, dy: float) -> 
             shared["track_x"][t], shared["track_y"][t] = x, y
             shared["track_was_x"][t], shared["track_was_y"][t] = x, y
             shared["track_vx"][t], shared["track_vy"][t] = 0.0, 0.0
+            shared["track_radius"][t] = rig.guarding.others_largest_m
             shared["track_anchor_x"][t] = shared["x"] + x
             shared["track_anchor_y"][t] = shared["y"] + y
             shared["track_moved_s"][t] = now
@@ -109,14 +112,15 @@ def gains(seen: int, error: float, swerve: float) -> tuple[float, float]:
 @jit_inner
 def _limit_speed_and_anchor(shared: Row, rig: Rig, now: float) -> None:
     """Clip estimated speeds to what the robots can do, slow unseen ones down, notice who stands still."""
+    fastest = max(rig.guarding.others_mps, rig.body.v_max_mps)
     for t in range(PEERS):
         if shared["track_id"][t] < 0:
             continue
         vx, vy = shared["track_vx"][t], shared["track_vy"][t]
         speed = math.sqrt(vx * vx + vy * vy)
         factor = 0.8 if shared["track_seen_s"][t] < now else 1.0
-        if speed > rig.body.v_max_mps:
-            factor *= rig.body.v_max_mps / speed
+        if speed > fastest:
+            factor *= fastest / speed
         shared["track_vx"][t] *= factor
         shared["track_vy"][t] *= factor
         x, y = shared["track_x"][t], shared["track_y"][t]
@@ -152,6 +156,43 @@ def _place(shared: Row, x: float, y: float) -> int:
 
 
 @jit_inline
+def measure_bodies(see: View) -> None:
+    """Learn how large neighbours are where robots differ: no return lies inside a body.
+
+    Each counts as large as the largest, until returns have shown less. Only what is seen in this tick tells, and no
+    more exactly than positions are known.
+    """
+    shared, rig = see.shared, see.rig
+    smallest, largest = rig.guarding.others_smallest_m, rig.guarding.others_largest_m
+    if not smallest < largest:
+        return
+    c, s = math.cos(see.percept["compass"]), math.sin(see.percept["compass"])
+    for t in range(PEERS):
+        if shared["track_id"][t] < 0 or shared["track_seen_s"][t] < see.percept["now_s"]:
+            continue
+        x = c * shared["track_x"][t] + s * shared["track_y"][t]
+        y = c * shared["track_y"][t] - s * shared["track_x"][t]
+        errs = neighbour_reach(0.0, math.sqrt(x * x + y * y), rig) - BESIDE_M + SKIN_M
+        errs += rig.guarding.others_mps * rig.guarding.latency_s
+        shows = _nearest_to(see, x, y) + errs
+        shared["track_radius"][t] = max(smallest, min(shared["track_radius"][t], shows))
+
+
+@jit_inner
+def _nearest_to(see: View, x: float, y: float) -> float:
+    """Return how near a return of now comes to the point (x, y), body frame [m]."""
+    rig, best = see.rig, math.inf
+    for n in range(rig.sensor.beams):
+        s = see.scan[n]
+        out_of_view = rig.sensor.field > 0 and not see.shared["view_first"] <= n <= see.shared["view_last"]
+        if see.unseen[n] != 0 or out_of_view or not s < rig.sensor.range_max:
+            continue
+        ex, ey = s * rig.cos[n] - x, s * rig.sin[n] - y
+        best = min(best, ex * ex + ey * ey)
+    return math.sqrt(best)
+
+
+@jit_inline
 def mask_moving_neighbours(see: View, still_s: float) -> None:
     """Copy the scan into ``see.masked`` without the returns of neighbours that move (no return instead), nor those that
     are kept for the guard alone.
@@ -184,7 +225,7 @@ def returns_of(see: View, t: int, hide: bool) -> float:
     x = c * shared["track_x"][t] + s * shared["track_y"][t]
     y = c * shared["track_y"][t] - s * shared["track_x"][t]
     d = math.sqrt(x * x + y * y)
-    reach = neighbour_reach(d, rig)
+    reach = neighbour_reach(shared["track_radius"][t], d, rig)
     nearest = math.inf
     if d - reach > sensor.range_max:
         return nearest
@@ -212,10 +253,10 @@ def returns_of(see: View, t: int, hide: bool) -> float:
 
 
 @jit_inline
-def neighbour_reach(distance: float, rig: Rig) -> float:
+def neighbour_reach(radius: float, distance: float, rig: Rig) -> float:
     """Return how far from a neighbour's estimated centre its returns may lie [m], errors included."""
     noise = rig.sensor.position_sigma + rig.sensor.range_sigma
-    return rig.body.radius_m + 0.06 + 2.0 * noise * distance
+    return radius + BESIDE_M + 2.0 * noise * distance
 
 
 @jit_inline
@@ -223,13 +264,13 @@ def near_track(percept: Row, shared: Row, px: float, py: float, rig: Rig) -> boo
     """Tell whether the return at (px, py), body frame, may belong to a neighbour: to where it is seen, or its track."""
     for k in range(percept["n_neighbours"]):
         x, y = percept["neighbour_x"][k], percept["neighbour_y"][k]
-        reach = neighbour_reach(math.sqrt(x * x + y * y), rig)
+        reach = neighbour_reach(rig.guarding.others_largest_m, math.sqrt(x * x + y * y), rig)
         if (px - x) ** 2 + (py - y) ** 2 <= reach * reach:
             return True
     gx, gy = _by_compass(percept, px, py)
     for t in range(PEERS):
         x, y = shared["track_x"][t], shared["track_y"][t]
-        reach = neighbour_reach(math.sqrt(x * x + y * y), rig)
+        reach = neighbour_reach(shared["track_radius"][t], math.sqrt(x * x + y * y), rig)
         if shared["track_id"][t] >= 0 and (gx - x) ** 2 + (gy - y) ** 2 <= reach * reach:
             return True
     return False
@@ -239,9 +280,9 @@ def near_track(percept: Row, shared: Row, px: float, py: float, rig: Rig) -> boo
 def on_track(percept: Row, shared: Row, px: float, py: float, rig: Rig) -> bool:
     """Tell whether the return at (px, py), body frame, lies where a neighbour's body is, errors left aside."""
     gx, gy = _by_compass(percept, px, py)
-    reach = rig.body.radius_m + SKIN_M
     for t in range(PEERS):
         x, y = shared["track_x"][t], shared["track_y"][t]
+        reach = shared["track_radius"][t] + SKIN_M
         if shared["track_id"][t] >= 0 and (gx - x) ** 2 + (gy - y) ** 2 <= reach * reach:
             return True
     return False
@@ -259,7 +300,7 @@ def was_near_track(percept: Row, shared: Row, px: float, py: float, rig: Rig) ->
         if shared["track_id"][t] < 0:
             continue
         x, y = shared["track_was_x"][t], shared["track_was_y"][t]
-        reach = neighbour_reach(math.sqrt(x * x + y * y), rig)
+        reach = neighbour_reach(shared["track_radius"][t], math.sqrt(x * x + y * y), rig)
         if shared["track_n"][t] < SEEN_TWICE or shared["track_seen_s"][t] < percept["now_s"]:
             reach += way
         if (gx - x) ** 2 + (gy - y) ** 2 <= reach * reach:

@@ -56,7 +56,7 @@ def _play(run: Run, run_files: bool) -> Played:
     records, robots = outcome.trace.records, outcome.trace.robots
     return Played(
         world=outcome.setup.world,
-        radius=scenario.robot.radius_m,
+        radius=scenario.widest.radius_m,
         dt=outcome.setting.dt,
         x=np.vstack([records.x, robots["x"]]),
         y=np.vstack([records.y, robots["y"]]),

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 from swarmscope.errors import SwarmscopeError
 from swarmscope.experiments.results import Run
-from swarmscope.onboard.body import Body, protection_model
+from swarmscope.onboard.body import protection_model
 from swarmscope.scenarios.read import parse_scenario
+from swarmscope.scenarios.to_kernels import body_of
 from swarmscope.viewing.pictures import FAINT, INK
 from swarmscope.viewing.report import words
 from swarmscope.viewing.report.again import Again, Played
@@ -189,6 +190,5 @@ def _scale_bar(axes: Axes, reach: float) -> None:
 
 
 def _sigma(run: Run) -> float:
-    robot = parse_scenario(run.config, f"run of seed {run.seed}").robot
-    body = Body(**robot.model_dump())
-    return protection_model(body).sigma_a
+    sheet = parse_scenario(run.config, f"run of seed {run.seed}").widest
+    return protection_model(body_of(sheet)).sigma_a

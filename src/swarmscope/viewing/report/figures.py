@@ -10,10 +10,11 @@ import numpy as np
 from swarmscope.errors import SwarmscopeError
 from swarmscope.experiments.experiment import Sweep, merged, sweep_label
 from swarmscope.experiments.results import Run, flow_time_increases
-from swarmscope.onboard.body import Body, protection_model
+from swarmscope.onboard.body import protection_model
 from swarmscope.onboard.deciding.fields import interaction_force
 from swarmscope.onboard.planners import load_planner
 from swarmscope.scenarios.scenario import RobotModel
+from swarmscope.scenarios.to_kernels import body_of
 from swarmscope.user_files import is_file_name
 from swarmscope.viewing.pictures import FAINT, INK
 from swarmscope.viewing.report import words
@@ -246,8 +247,7 @@ def field_picture(material: Material) -> Picture:
     runs: list[Run] = material.of("all", planner)
     keys = runs[0].config if runs else material.experiment.scenario
     robot = RobotModel.model_validate(keys.get("robot", {}))
-    body = Body(**robot.model_dump())
-    sigma = protection_model(body).sigma_a
+    sigma = protection_model(body_of(robot)).sigma_a
     params = _defaults(material, planner) | dict(material.planner_keys(planner).get("params", {}))
     w_i = float(params.get("w_i", 1.0))
     distance = np.linspace(0.5 * sigma, 4.0 * sigma, 400)
