@@ -40,6 +40,10 @@ from swarmscope.onboard.sharing.tracks import near_track, on_track, returns_of
 from swarmscope.onboard.view import BROKEN, View
 
 FRACTIONS = (1.0, 0.8, 0.6, 0.4, 0.2, 0.1, 0.05, 0.0)
+CREEP = 0.4
+"""Where somebody may come who does not yield the slowest speed but 0 is slower by this: it may be all that passes."""
+LEAST_MPS = 1e-3
+"""There what is slower than this stands."""
 FREE = -1
 STANDS_MPS = 1e-6
 SOME_LOSSES, MOST_LOSSES = 0.2, 0.35
@@ -105,8 +109,13 @@ def _allowed(see: View, asked: float, w: float) -> tuple[float, float, int]:
     near = _near(see, max(speed, min(wanted, speed + body.a_max_mps2 * dt)))
     _measure_gaps(see)
     why = FREE
+    strange = see.rig.guarding.strangers_mps > 0.0
     for fraction in FRACTIONS:
         v = wanted * fraction
+        if strange and fraction == FRACTIONS[-2]:
+            v *= CREEP
+        if strange and v < LEAST_MPS:
+            v = 0.0
         held = _held_by(see, v, w, near)
         if held == FREE:
             return v, w, why
@@ -268,7 +277,7 @@ def _held_by_beam(see: View, n: int, way: Way, others: Others, bulge: float, eno
 def _held_by_strangers(see: View, v: float, way: Way, near: Near) -> bool:
     """Tell whether somebody who does not yield could reach a robot that takes this way before it stands.
 
-    Whoever comes is a return that does not stand and is no robot's, or is hidden behind one.
+    Whoever comes is a return that does not stand, is hidden behind one, or walks through another robot.
     """
     rig, coming = see.rig, strangers(v, see.percept["dt_s"], see.rig)
     enough, least = matters_up_to(way, coming), least_range(rig)
@@ -280,9 +289,11 @@ def _held_by_strangers(see: View, v: float, way: Way, near: Near) -> bool:
         if not s < rig.sensor.range_max:
             continue
         s *= max(0.5, 1.0 - SIGMAS * rig.sensor.range_sigma)
-        px, py = s * rig.cos[n], s * rig.sin[n]
-        comes = see.standing[n] != STANDS and not leaves_room(px, py, s, way, coming, rig)
-        if comes and not _is_robots(see, px, py):
+        c, si, apart = rig.cos[n], rig.sin[n], 2.0 * rig.guarding.others_smallest_m
+        robots = _is_robots(see, s * c, s * si)
+        if robots:
+            s += apart
+        if (robots or see.standing[n] != STANDS) and not leaves_room(s * c, s * si, s, way, coming, rig):
             return True
         if not out_of_hidden_halves(see, n, way, coming, enough):
             return True

@@ -18,6 +18,7 @@ from swarmscope.onboard.perception.beams import beam_at
 from swarmscope.onboard.perception.frames import in_view
 from swarmscope.onboard.perception.holes import LOOKED_THROUGH, find_looked_through
 from swarmscope.onboard.perception.mend import least_range
+from swarmscope.onboard.perception.standing import STANDS
 from swarmscope.onboard.sharing.tracks import was_near_track
 from swarmscope.onboard.view import BROKEN, GUARD_ALONE, View
 
@@ -92,14 +93,15 @@ def _find_lost(see: View, most: int) -> tuple[int, bool]:
 
     Return how many were lost where the scan says nothing, and whether any were, where it is broken included.
     """
-    total = see.rig.sensor.beams
+    rig, total = see.rig, see.rig.sensor.beams
     here = see.percept["odom_x"], see.percept["odom_y"], see.percept["odom_yaw"]
     c, s = math.cos(here[2]), math.sin(here[2])
+    goes = rig.guarding.strangers_mps > 0.0  # what moves has not been lost
     _mark_silent(see)
     _find_beams(see, here, most)
     lost, found = 0, False
     for n in range(total):
-        if _is_seen(see, n):
+        if _is_seen(see, n) or (goes and see.standing[n] != STANDS):
             continue
         x, y = see.kept[n] * see.rig.cos[n] - here[0], see.kept[n] * see.rig.sin[n] - here[1]
         x, y = c * x + s * y, c * y - s * x

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from swarmscope._jit import jit, jit_inline, jit_inner
+from swarmscope._jit import jit, jit_inner
 from swarmscope.geometry import point_segment_distance, rough_angle
 from swarmscope.onboard.perception.beams import beam_at
 from swarmscope.onboard.perception.frames import astray, move_poses
@@ -40,7 +40,7 @@ def tell_standing(see: View) -> None:
     past, rig, now = see.past, see.rig, see.percept["now_s"]
     move_poses(see.percept, past.poses)
     used = int(see.shared["past_n"])
-    far = matters_within(rig, see.percept["dt_s"])
+    far = rig.sensor.range_max
     for n in range(rig.sensor.beams):
         see.standing[n] = MAY_MOVE
         if see.scan[n] < far:
@@ -49,16 +49,6 @@ def tell_standing(see: View) -> None:
     last = int(see.shared["past_at"])
     if used == 0 or now - past.at_s[last] >= EVERY_S - 1e-9 or now < past.at_s[last]:
         _keep(see, used, last, now)
-
-
-@jit_inline
-def matters_within(rig: Rig, dt: float) -> float:
-    """Return the range within which it matters who may come, however fast the robot is [m]."""
-    body, guarding = rig.body, rig.guarding
-    delay = dt + guarding.latency_s
-    stops = delay + body.v_max_mps / body.a_max_mps2
-    way = body.v_max_mps * delay + body.v_max_mps * body.v_max_mps / (2.0 * body.a_max_mps2)
-    return body.radius_m + guarding.clearance_m + way + guarding.strangers_mps * stops + SPAN_M
 
 
 @jit_inner
