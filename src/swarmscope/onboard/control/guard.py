@@ -25,7 +25,7 @@ from swarmscope.onboard.percept import MAX_NEIGHBOURS, PEERS, Row
 from swarmscope.onboard.perception.frames import is_blurred
 from swarmscope.onboard.perception.holes import nothing_up_to
 from swarmscope.onboard.perception.mend import body_and_clearance, least_range
-from swarmscope.onboard.perception.standing import STANDS
+from swarmscope.onboard.perception.standing import MOVES, STANDS
 from swarmscope.onboard.reasons import (
     R_HELD_BLIND,
     R_HELD_CORNER,
@@ -277,10 +277,14 @@ def _held_by_beam(see: View, n: int, way: Way, others: Others, bulge: float, eno
 def _held_by_strangers(see: View, v: float, way: Way, near: Near) -> bool:
     """Tell whether somebody who does not yield could reach a robot that takes this way before it stands.
 
-    Whoever comes is a return that does not stand, is hidden behind one, or walks through another robot.
+    Whoever comes is a return that does not stand, is hidden behind one, or walks through another robot: one that is
+    hidden behind it as a whole is farther away, in the ratio of their radii, and one of whom something shows may not be.
     """
     rig, coming = see.rig, strangers(v, see.percept["dt_s"], see.rig)
     enough, least = matters_up_to(way, coming), least_range(rig)
+    behind = max(1.0, coming.smallest / rig.guarding.others_largest_m)
+    if _nearest_moving(see, near) < enough:
+        behind = 1.0
     for k in range(near.beams):
         n = int(see.edges[k])
         s = float(see.scan[n])
@@ -289,15 +293,27 @@ def _held_by_strangers(see: View, v: float, way: Way, near: Near) -> bool:
         if not s < rig.sensor.range_max:
             continue
         s *= max(0.5, 1.0 - SIGMAS * rig.sensor.range_sigma)
-        c, si, apart = rig.cos[n], rig.sin[n], 2.0 * rig.guarding.others_smallest_m
+        c, si = rig.cos[n], rig.sin[n]
         robots = _is_robots(see, s * c, s * si)
         if robots:
-            s += apart
+            s *= behind
         if (robots or see.standing[n] != STANDS) and not leaves_room(s * c, s * si, s, way, coming, rig):
             return True
         if not out_of_hidden_halves(see, n, way, coming, enough):
             return True
     return False
+
+
+@jit_inner
+def _nearest_moving(see: View, near: Near) -> float:
+    """Return the smallest range of a return that moves and is no robot's [m]."""
+    rig, best = see.rig, math.inf
+    for k in range(near.beams):
+        n = int(see.edges[k])
+        s = float(see.scan[n])
+        if see.standing[n] == MOVES and s < best and not _is_robots(see, s * rig.cos[n], s * rig.sin[n]):
+            best = s
+    return best
 
 
 @jit_inner
