@@ -38,10 +38,10 @@ def _run(sim, swarm, ticks, mode):
             see = view_of(swarm, i)
             decision = see.out
             when = tick // 8 if mode == STUBBORN else tick
-            decision["v"] = sim.v_max * (1.5 * uniform(key(sim.clock.seed, i, when, 101)) - 0.1)
-            decision["w"] = sim.w_max * (2.4 * uniform(key(sim.clock.seed, i, when, 102)) - 1.2)
+            decision["v"] = sim.fastest * (1.5 * uniform(key(sim.clock.seed, i, when, 101)) - 0.1)
+            decision["w"] = sim.robots[i]["w_max"] * (2.4 * uniform(key(sim.clock.seed, i, when, 102)) - 1.2)
             if mode == CHASE and uniform(key(sim.clock.seed, i, tick // 5, 103)) < 0.8:
-                decision["v"] = sim.v_max
+                decision["v"] = sim.fastest
                 decision["w"] = (
                     _nearest_bearing(see.scan, rig.sensor.angle_min, rig.sensor.increment) / sim.clock.dt
                 )

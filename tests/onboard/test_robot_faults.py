@@ -96,7 +96,8 @@ def test_a_scan_that_is_none_brakes_and_the_next_good_one_drives(what):
 
 BAD_VALUES = [
     ("goal", (NAN, 1.0)), ("goal", (0.0, NAN)), ("goal", (INF, 1.0)), ("goal", (0.0, INF)), ("goal", (0.0, -1.0)),
-    ("goal", (0.0, 1e300)), ("goal", (0.0,)), ("goal", (0.0, 1.0, 2.0)), ("goal", 5.0), ("goal", "ab"), ("goal", None),
+    ("goal", (0.0, 1e300)), ("goal", (0.0,)), ("goal", (0.0, 1.0, NAN)), ("goal", (0.0, 1.0, 0.0, 2.0)), ("goal", 5.0),
+    ("goal", "ab"), ("goal", None),
     ("goal", Hostile()), ("goal", (Hostile(), 1.0)), ("goal", itertools.repeat(1.0)), ("goal", (10**400, 1.0)),
     ("heading", NAN), ("heading", INF), ("heading", None), ("heading", "east"), ("heading", [1.0]),
     ("heading", Hostile()), ("heading", np.array([1.0])), ("heading", 10**400), ("heading", 1j),

@@ -58,7 +58,7 @@ def test_the_rig_of_a_scenario_is_the_one_of_a_robot():
 @pytest.mark.parametrize(
     ("model", "kernels"),
     [
-        (RobotModel, Body()._asdict()),
+        (RobotModel, Body()._asdict() | {"footprint": None}),
         (RadioModel, Radio()._asdict() | Sharing()._asdict()),
         (GuardModel, Guarding()._asdict()),
         (SafetyModel, Safety()._asdict()),

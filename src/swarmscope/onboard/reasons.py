@@ -28,8 +28,8 @@ REASON_NAMES = (
     "guard: stands, looks at what it has not seen beside its way",
     "guard: stands, the LiDAR loses too much of what is there",
     "guard: stands, a number is missing: time, speed, compass or command",
-    "turns to the heading that is wanted at the goal",
     "guard: stands, somebody who does not yield may come",
+    "turns to the heading that is wanted at the goal",
 )
 (
     R_FREE,
@@ -51,7 +51,7 @@ REASON_NAMES = (
     R_HELD_UNSEEN,
     R_HELD_BLIND,
     R_HELD_NO_NUMBER,
-    R_TURNS,
     R_HELD_STRANGER,
+    R_TURNS,
 ) = range(21)
 FIRST_OWN = len(REASON_NAMES)

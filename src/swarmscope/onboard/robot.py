@@ -277,5 +277,5 @@ def _count(goal: Any) -> int:
     """Return how many numbers a goal has: 3 with a heading."""
     try:
         return 3 if len(goal) == 3 else 2
-    except TypeError:
+    except Exception:  # an input stranger than anybody thought of: it will be said what it is not
         return 2

@@ -110,7 +110,7 @@ def _keys(schema: Mapping[str, Any], groups: Mapping[str, Any], prefix: str) -> 
 
 def _group(field: Mapping[str, Any], groups: Mapping[str, Any]) -> Mapping[str, Any] | None:
     """Return the schema of the group that a field is, None for a field with a value."""
-    for part in (field, *field.get("anyOf", ()), *field.get("allOf", ())):
+    for part in (field, *field.get("anyOf", ()), *field.get("oneOf", ())):
         if "$ref" in part:
             found: Mapping[str, Any] = groups[part["$ref"].rpartition("/")[2]]
             return found

@@ -38,7 +38,8 @@ def _sense_self(sim: Sim, tick: int, i: int) -> None:
     percept["compass"] = wrap_angle(heading)
     percept["goal_bearing"] = wrap_angle(math.atan2(gy, gx) - heading)
     percept["goal_distance"] = math.sqrt(gx * gx + gy * gy)
-    percept["goal_turn"] = wrap_angle(robot["goal_yaw"] - heading)
+    turn = robot["goal_yaw"] - heading
+    percept["goal_turn"] = wrap_angle(turn) if math.isfinite(turn) else math.nan
     measure_motion(sim, tick, i)
 
 

@@ -40,6 +40,7 @@ def with_track(x, y=0.0, rig=None):
     rows = one_robot(rig)
     rows.shared["track_id"][0] = 2
     rows.shared["track_x"][0], rows.shared["track_y"][0] = x, y
+    rows.shared["track_radius"][0] = rows.rig.body.radius_m
     return rows
 
 

@@ -11,12 +11,12 @@ from helpers import DT, circles_world, make_sensor, one_robot, place_scenario, r
 from swarmscope.onboard.control.guard import guard
 from swarmscope.onboard.perception.frames import keep_frame, look_back
 from swarmscope.onboard.reasons import (
-    FIRST_OWN,
     R_FREE,
     R_HELD_BLIND,
     R_HELD_CORNER,
     R_HELD_NO_NUMBER,
     R_HELD_ROBOT,
+    R_HELD_STRANGER,
     R_HELD_THING,
     R_HELD_UNSEEN,
     REASON_NAMES,
@@ -25,7 +25,7 @@ from swarmscope.onboard.sensor import all_round
 from swarmscope.onboard.sharing.tracks import update_odometry, update_tracks
 
 OPEN = np.full(360, np.inf, np.float32)
-HELD = [R_HELD_THING, R_HELD_ROBOT, R_HELD_CORNER, R_HELD_UNSEEN, R_HELD_BLIND, R_HELD_NO_NUMBER]
+HELD = [R_HELD_THING, R_HELD_ROBOT, R_HELD_CORNER, R_HELD_UNSEEN, R_HELD_BLIND, R_HELD_NO_NUMBER, R_HELD_STRANGER]
 
 
 def asked(rows, v=0.5, w=0.0, speed=0.0, scan=OPEN):
@@ -42,9 +42,9 @@ def in_front_of(distance, rig):
     return scan_at(circles_world([(0.15 + distance + 1.0, 0.0, 1.0)]), rig)
 
 
-def test_the_guards_words_are_the_last_shared_ones():
-    assert list(range(FIRST_OWN - 6, FIRST_OWN)) == HELD
+def test_the_guards_words_say_what_holds_it():
     words = ("in the way", "another robot", "round a corner", "has not seen", "loses too much", "a number is missing")
+    words += ("does not yield",)
     for reason, said in zip(HELD, words, strict=True):
         assert REASON_NAMES[reason].startswith("guard: stands") and said in REASON_NAMES[reason]
 

@@ -202,7 +202,7 @@ def _held_by(see: View, v: float, w: float, near: Near) -> int:
     """
     rig, percept = see.rig, see.percept
     speed = _speed_at_most(see)
-    way = way_of(speed, v, w, see)
+    way = way_of(speed, v, w, rig.guarding.latency_s, see)
     if way.x5 * way.x5 + way.y5 * way.y5 + way.brake < 1e-10 and speed < STANDS_MPS:
         return FREE
     others = other_robots(v, percept["dt_s"], rig)
@@ -217,16 +217,41 @@ def _held_by(see: View, v: float, w: float, near: Near) -> int:
             return R_HELD_UNSEEN
         if held != FREE:
             return held
-    if rig.guarding.strangers_mps > 0.0:  # such robots see all round
-        return R_HELD_STRANGER if _held_by_strangers(see, v, way, near) else FREE
-    if rig.sensor.field > 0:
-        kept, _ = _kept_from(rig.body.radius_m, bulge, rig)
-        front = kept + reaches_between(rig.body.radius_m)
-        x, y = out_of_sight(see, way, min(front, near.nearest - 1e-6))
-        if x != 0.0 or y != 0.0:
-            see.shared["unseen_left"] = y > 0.0
-            return R_HELD_UNSEEN
-    return FREE
+    held = _held_by_unseen(see, way, bulge, near)
+    if rig.guarding.strangers_mps > 0.0 and _held_by_strangers(see, v, way, near):
+        held = R_HELD_STRANGER
+    if held == FREE and way.turns and rig.guarding.latency_s > 0.0:
+        held = _held_at_once(see, way_of(speed, v, w, 0.0, see), bulge, near)
+    return held
+
+
+@jit_inner
+def _held_by_unseen(see: View, way: Way, bulge: float, near: Near) -> int:
+    """Return whether a way leads where nobody has looked: FREE, or the reason."""
+    rig = see.rig
+    if rig.sensor.field == 0:
+        return FREE
+    kept, _ = _kept_from(rig.body.radius_m, bulge, rig)
+    front = kept + reaches_between(rig.body.radius_m)
+    x, y = out_of_sight(see, way, min(front, near.nearest - 1e-6))
+    if x == 0.0 and y == 0.0:
+        return FREE
+    see.shared["unseen_left"] = y > 0.0
+    return R_HELD_UNSEEN
+
+
+@jit
+def _held_at_once(see: View, way: Way, bulge: float, near: Near) -> int:
+    """Return what of all that stands holds a robot back that heeds its command at once, not as late as it may be.
+
+    A way that turns later is another one, not just a longer one.
+    """
+    for k in range(near.beams):
+        n = int(see.edges[k])
+        s, need = _nearest_of(see, n, bulge)
+        if _meets(see, n, s, need, way):
+            return R_HELD_THING
+    return _held_by_unseen(see, way, bulge, near)
 
 
 @jit_inline
@@ -250,22 +275,37 @@ def _kept_from(s: float, bulge: float, rig: Rig) -> tuple[float, float]:
 
 
 @jit_inner
-def _held_by_beam(see: View, n: int, way: Way, others: Others, bulge: float, enough: float) -> int:
-    """Return how the return of beam n, or who may come out from behind it, forbids a way: FREE, or the reason."""
-    rig, percept, s = see.rig, see.percept, see.scan[n]
+def _nearest_of(see: View, n: int, bulge: float) -> tuple[float, float]:
+    """Return at which range what beam n sees may be, and what the centre keeps off there [m]."""
+    rig, s = see.rig, see.scan[n]
     if not s >= least_range(rig):
         s = body_and_clearance(rig)
     kept, s = _kept_from(s, bulge, rig)
     if see.unseen[n] & BROKEN:
         s = min(s, nothing_up_to(see, n))
-    need = min(kept, s - 1e-6)  # already too close: never closer
-    px, py = s * rig.cos[n], s * rig.sin[n]
-    if s - need < way.reach + ROUNDING_M and (
-        closer(px, py, way, need) or (way.turns and shadowed(px, py, rig.cos[n], rig.sin[n], way, need))
-    ):
+    return s, min(kept, s - 1e-6)  # already too close: never closer
+
+
+@jit_inner
+def _meets(see: View, n: int, s: float, need: float, way: Way) -> bool:
+    """Tell whether a way comes closer than ``need`` to the return of beam n at range ``s``, or to what it hides."""
+    c, si = see.rig.cos[n], see.rig.sin[n]
+    if not s - need < way.reach + ROUNDING_M:
+        return False
+    px, py = s * c, s * si
+    return bool(closer(px, py, way, need) or (way.turns and shadowed(px, py, c, si, way, need)))
+
+
+@jit_inner
+def _held_by_beam(see: View, n: int, way: Way, others: Others, bulge: float, enough: float) -> int:
+    """Return how the return of beam n, or who may come out from behind it, forbids a way: FREE, or the reason."""
+    rig, percept = see.rig, see.percept
+    s, need = _nearest_of(see, n, bulge)
+    if _meets(see, n, s, need, way):
         return R_HELD_THING
     if not rig.guarding.others_mps > 0.0:
         return FREE
+    px, py = s * rig.cos[n], s * rig.sin[n]
     if not leaves_room(px, py, s, way, others, rig) and (
         s > _listed_up_to(percept, rig) or near_track(percept, see.shared, px, py, rig)
     ):
@@ -278,7 +318,7 @@ def _held_by_strangers(see: View, v: float, way: Way, near: Near) -> bool:
     """Tell whether somebody who does not yield could reach a robot that takes this way before it stands.
 
     Whoever comes is a return that does not stand, is hidden behind one, or walks through another robot: one that is
-    hidden behind it as a whole is farther away, in the ratio of their radii, and one of whom something shows may not be.
+    hidden behind it as a whole is farther away, in the ratio of their radii; one of whom something shows may not be.
     """
     rig, coming = see.rig, strangers(v, see.percept["dt_s"], see.rig)
     enough, least = matters_up_to(way, coming), least_range(rig)

@@ -35,11 +35,11 @@ class Way(NamedTuple):
 
 
 @jit_inline
-def way_of(speed: float, v: float, w: float, see: View) -> Way:
-    """Return the way of commanding (v, w) at ``speed``."""
+def way_of(speed: float, v: float, w: float, late: float, see: View) -> Way:
+    """Return the way of commanding (v, w) at ``speed``; for ``late`` [s] the robot goes on straight before that."""
     a_max = see.rig.body.a_max_mps2
     step = see.percept["dt_s"] / STEPS
-    x0 = speed * see.rig.guarding.latency_s
+    x0 = speed * late
     driven = abs(x0)
     speed, way = ramp(speed, v, a_max, step)
     driven += abs(way)

@@ -1,8 +1,8 @@
 """Which returns are of things that stand: before all others a robot has to fear that they come (docs/safety.md).
 
 Three scans of the last second are kept, moved on by odometry. A return stands where they show a surface at its place.
-It moves where one of them has looked through its place, or has seen something before it that is gone. What was hidden then
-stands if it joins on to what stands: as a robot drives, it sees more of the same wall. All else may move.
+It moves where one of them has looked through its place, or has seen something before it that is gone. What was hidden
+then stands if it joins on to what stands: as a robot drives, it sees more of the same wall. All else may move.
 """
 
 from __future__ import annotations
