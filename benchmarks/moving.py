@@ -1,8 +1,8 @@
 """Robots among discs that move and do not yield: python benchmarks/moving.py [--runs 0-199] [--planner nav-scope]
 
 Every run draws a hall of 12 x 12 m with posts and 4 to 8 discs of 0.2 to 0.4 m that go to and fro, round and round or
-straight on at 0.2 to 2 m/s, and 3 robots of 0.5 to 1 m/s that cross it. Whenever a disc and a robot touch, the robot has
-to stand: a robot that drives then counts as collided.
+straight on at 0.2 to 2 m/s, and 3 robots of 0.5 to 1 m/s that cross it. Whenever a disc and a robot touch, the robot
+has to stand: a robot that drives then counts as collided.
 """
 
 from __future__ import annotations
@@ -65,7 +65,8 @@ def _off_way(place: tuple[float, float], disc: Obstacle) -> float:
     ends = np.vstack([legs[1:, :3], legs[:1, :3]])
     ends[:, 0] = np.where(ends[:, 0] > legs[:, 0], ends[:, 0], legs[:, 0] + 100.0)
     until = legs[:, 1:3] + legs[:, 3:] * (ends[:, :1] - legs[:, :1])
-    return min(point_segment_distance(*place, *a, *b) for a, b in zip(legs[:, 1:3].tolist(), until.tolist(), strict=True))
+    pieces = zip(legs[:, 1:3].tolist(), until.tolist(), strict=True)
+    return min(point_segment_distance(*place, *a, *b) for a, b in pieces)
 
 
 def _disc(rng: np.random.Generator) -> Obstacle:

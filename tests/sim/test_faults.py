@@ -214,5 +214,5 @@ def test_choices_are_noted_at_the_time_of_the_run_whatever_a_clock_says():
 
 def test_a_memory_of_python_objects_cannot_be_emptied():
     swarm = new_swarm(1, rig_of())
-    with pytest.raises(ConfigError, match=r"^faults\.restarts_per_h, robot\.start_s: planner 'nav-scope' keeps Python objects"):
+    with pytest.raises(ConfigError, match=r"^faults\.restarts_per_h, robot\.start_s: planner 'nav-scope' keeps"):
         blanks(load_planner("nav-scope"), swarm, np.zeros(1, [("a", object)]))
