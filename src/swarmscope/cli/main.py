@@ -125,16 +125,20 @@ def run(
     force: Annotated[bool, typer.Option("--force", help="Write over the run of another scenario.")] = False,
     threads: Annotated[int, typer.Option(min=1, max=256, help="Threads; the result is the same.")] = 1,
     pictures: Annotated[bool, typer.Option(help="Make paths.png and replay.html.")] = True,
+    mcap: Annotated[
+        bool, typer.Option("--mcap", help="Make run.mcap, too: ROS 2 messages for Foxglove, Rerun, rosbag2.")
+    ] = False,
     no_code: NoCode = False,
 ) -> None:
     """Run one scenario to a folder: metrics, trajectory, world, a picture, a replay page."""
-    from swarmscope.cli.run import run_command
+    from swarmscope.cli.run import Make, run_command
 
     place: dict[str, Any] = {"resolution_m": resolution, "number": number, "trips": trips, "first_trip": first_trip}
     place |= {"starts": start, "goals": goal}
     options: dict[str, Any] = {"robots": robots, "seed": seed, "limit_s": limit}
     options |= {f"map.{key}": value for key, value in place.items()}
-    run_command(scenario, task, map_, planner, options, set_ or [], out, threads, pictures, not no_code, force)
+    make = Make(pictures, mcap)
+    run_command(scenario, task, map_, planner, options, set_ or [], out, threads, make, not no_code, force)
 
 
 @app.command(
@@ -199,6 +203,23 @@ def replay(
     typer.echo(str(page))
     if open_:
         typer.launch(page.resolve().as_uri())
+
+
+@app.command(
+    epilog="Examples:\n\n"
+    "[bold]swarmscope mcap runs/first[/bold]\n\n"
+    "[bold]swarmscope mcap runs/first --out forest.mcap; ros2 bag play forest.mcap[/bold]"
+)
+def mcap(
+    run_dir: Annotated[Path, typer.Argument(help="A run folder.")],
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="MCAP file, else run.mcap in the folder.")] = None,
+    threads: Annotated[int, typer.Option(min=1, max=256, help="Threads; the result is the same.")] = 1,
+    no_code: NoCode = False,
+) -> None:
+    """Play a run again and write all that its robots saw and did as ROS 2 messages (Foxglove, Rerun, rosbag2)."""
+    from swarmscope.cli.mcap import mcap_command
+
+    mcap_command(run_dir, out, threads, not no_code)
 
 
 @app.command(

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from swarmscope.sim.world import Circle, Grid, Obstacle, Polygon, Wall
+from swarmscope.viewing.colours import CRASH, FAINT, GROUND, INK, SOLID, SOLID_EDGE, WALL, robot_colours
 from swarmscope.viewing.run_data import (
     RunData,
     crash_ticks,
@@ -30,10 +31,6 @@ LONG_SIDE_IN = 9.0
 MOST_NUMBERS = 60
 """More robots have no numbers in the picture: one could not read them."""
 
-INK, FAINT, GROUND = "#2b333b", "#7b8590", "#fbfaf7"
-SOLID, SOLID_EDGE = "#c9d2c4", "#a4b19d"
-CRASH = "#c23b22"
-
 
 def write_picture(run_dir: Path) -> Path:
     """Write ``paths.png`` into the run folder and return its path; the same run gives the same bytes."""
@@ -48,15 +45,15 @@ def _render(run: RunData) -> bytes:
 
     with mpl.rc_context():
         mpl.rcdefaults()
-        extent = _extent(run)
+        extent = extent_of(run)
         width, height = extent[2] - extent[0], extent[3] - extent[1]
         inch = LONG_SIDE_IN / max(width, height)
         size = (max(6.0, width * inch) + 1.0, max(2.5, height * inch) + 1.7)
         figure = Figure(figsize=size, dpi=150, facecolor="white")
         FigureCanvasAgg(figure)
         axes = figure.add_axes((0.7 / size[0], 1.15 / size[1], 1.0 - 1.0 / size[0], 1.0 - 1.7 / size[1]))
-        _draw_frame(axes, extent)
-        _draw_obstacles(axes, run.world.obstacles)
+        draw_frame(axes, extent)
+        draw_obstacles(axes, run.world.obstacles)
         _draw_robots(axes, run)
         _draw_words(axes, figure, run)
         buffer = io.BytesIO()
@@ -64,7 +61,7 @@ def _render(run: RunData) -> bytes:
     return buffer.getvalue()
 
 
-def _extent(run: RunData) -> tuple[float, float, float, float]:
+def extent_of(run: RunData) -> tuple[float, float, float, float]:
     """Return x0, y0, x1, y1 [m] around what is worth looking at and everything a robot did."""
     x0, y0, x1, y1 = shown_bounds(run.world)
     margin = 2.0 * max(robot.radius for robot in run.world.robots)
@@ -74,7 +71,8 @@ def _extent(run: RunData) -> tuple[float, float, float, float]:
     return *low, max(x1, float(xs.max()) + margin), max(y1, float(ys.max()) + margin)
 
 
-def _draw_frame(axes: Axes, extent: tuple[float, float, float, float]) -> None:
+def draw_frame(axes: Axes, extent: tuple[float, float, float, float]) -> None:
+    """Draw the ground and the scales of ``extent`` x0, y0, x1, y1 [m]."""
     axes.set_xlim(extent[0], extent[2])
     axes.set_ylim(extent[1], extent[3])
     axes.set_aspect("equal")
@@ -86,7 +84,8 @@ def _draw_frame(axes: Axes, extent: tuple[float, float, float, float]) -> None:
         spine.set_color("#d5d8da")
 
 
-def _draw_obstacles(axes: Axes, obstacles: list[Obstacle]) -> None:
+def draw_obstacles(axes: Axes, obstacles: list[Obstacle]) -> None:
+    """Draw what stands in the world."""
     from matplotlib import patches
     from matplotlib.collections import LineCollection, PatchCollection
 
@@ -100,7 +99,7 @@ def _draw_obstacles(axes: Axes, obstacles: list[Obstacle]) -> None:
             _draw_grid(axes, obstacle)
     axes.add_collection(PatchCollection(solids, facecolor=SOLID, edgecolor=SOLID_EDGE, linewidth=0.8))
     walls = [obstacle.points for obstacle in obstacles if isinstance(obstacle, Wall)]
-    axes.add_collection(LineCollection(walls, colors="#8c9a86", linewidths=2.2, capstyle="round"))
+    axes.add_collection(LineCollection(walls, colors=WALL, linewidths=2.2, capstyle="round"))
 
 
 def _draw_grid(axes: Axes, grid: Grid) -> None:
@@ -115,10 +114,8 @@ def _draw_grid(axes: Axes, grid: Grid) -> None:
 
 
 def _draw_robots(axes: Axes, run: RunData) -> None:
-    from matplotlib import colormaps
-
     trajectory, robots = run.trajectory, run.world.robots
-    colours = colormaps["plasma"](np.linspace(0.0, 0.84, len(robots)))
+    colours = robot_colours(len(robots))
     ends = np.minimum(crash_ticks(trajectory), trajectory.t_s.size - 1)
     goals = np.array([robot.goal for robot in robots])
     axes.scatter(goals[:, 0], goals[:, 1], s=70, facecolor="none", edgecolor=colours, lw=1.4)

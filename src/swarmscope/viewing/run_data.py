@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -170,16 +171,22 @@ def crash_ticks(trajectory: Trajectory) -> Array:
 
 def replace_file(path: Path, content: bytes) -> Path:
     """Write ``content`` under a temporary name, then rename it to ``path``: no reader meets half a file."""
+    with replacing(path) as temporary:
+        temporary.write_bytes(content)
+    return path
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Give the body a temporary name to write to; what is there afterwards is synced and renamed to ``path``."""
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
-        with temporary.open("wb") as file:
-            file.write(content)
-            file.flush()
+        yield temporary
+        with temporary.open("rb") as file:
             os.fsync(file.fileno())
         temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)
-    return path
 
 
 def _checked_world(path: Path, content: Mapping[str, Any]) -> WorldFile:
