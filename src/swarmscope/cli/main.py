@@ -224,6 +224,30 @@ def mcap(
 
 @app.command(
     epilog="Examples:\n\n"
+    "[bold]swarmscope video runs/first[/bold]\n\n"
+    "[bold]swarmscope video runs/first -o forest.mp4 --speed 4 --fps 30 --size 1080[/bold]"
+)
+def video(
+    run_dir: Annotated[Path, typer.Argument(help="A run folder.")],
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="A .gif, or an .mp4 (extra video); else video.gif in the folder.")
+    ] = None,
+    speed: Annotated[
+        float | None, typer.Option(help="Seconds of the run in one of the video, else so that it takes half a minute.")
+    ] = None,
+    fps: Annotated[int, typer.Option(min=1, max=50, help="Frames per second.")] = 20,
+    size: Annotated[int, typer.Option(min=200, max=2160, help="Longer side of the picture, pixels.")] = 800,
+    scans: Annotated[bool, typer.Option(help="Draw scans and safe directions.")] = True,
+) -> None:
+    """Make a video of a run folder: robots, their ways, scans, safe directions and packets."""
+    from swarmscope.cli.video import video_command
+    from swarmscope.viewing.video.write import Film
+
+    video_command(run_dir, out, Film(speed, fps, size, scans))
+
+
+@app.command(
+    epilog="Examples:\n\n"
     "[bold]swarmscope barn the-barn-challenge/jackal_helper/worlds/BARN --every 10[/bold]\n\n"
     "[bold]swarmscope barn BARN_dataset --planner nav-scope --planner mine.py --speed 1 --speed 2[/bold]\n\n"
     "[bold]swarmscope barn BARN_dataset --set safety.look_ahead_m=2 --worlds 0-49 --out barn.json[/bold]\n\n"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from swarmscope.errors import InputFileError
+from swarmscope.errors import InputFileError, SwarmscopeError
 from swarmscope.judging.cases import CHOICE_COLUMNS, OPINION_COLUMNS
 from swarmscope.judging.run_folder import TRAJECTORY, WORLD, read_metrics, read_trajectory, read_world
 from swarmscope.sim.world import Grid, Length, Number, Obstacle, Point, grid_corners, solid_from_grid
@@ -178,15 +178,21 @@ def replace_file(path: Path, content: bytes) -> Path:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Give the body a temporary name to write to; what is there afterwards is synced and renamed to ``path``."""
+    """Give the body a temporary name to write to; what is there afterwards is synced and renamed to ``path``.
+
+    A SwarmscopeError says why it cannot be written.
+    """
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
         yield temporary
         with temporary.open("rb") as file:
             os.fsync(file.fileno())
         temporary.replace(path)
+    except OSError as error:
+        raise SwarmscopeError(f"{path}: cannot be written: {error.strerror or error}") from error
     finally:
-        temporary.unlink(missing_ok=True)
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
 
 
 def _checked_world(path: Path, content: Mapping[str, Any]) -> WorldFile:
