@@ -138,6 +138,11 @@ def test_damaged_files_are_named(folder: Path, name: str, damage: str) -> None:
         ({"links": np.array([[0, 6, 1, 20]])}, "links"),
         ({"scan_u8": np.zeros((60, 6, 71), np.uint8)}, "scan_u8"),
         ({"state": np.full((60, 6), "advance")}, "state"),
+        ({"choices": np.array([[60, 0, 0.5, 0.5, 1, 0]])}, "choices names a tick or a robot"),
+        ({"choices": np.array([[1, 0.5, 0.5, 0.5, 1, 0]])}, "choices names a tick or a robot"),
+        ({"choices": np.array([[1, np.nan, 0.5, 0.5, 1, 0]])}, "choices names a tick or a robot"),
+        ({"opinions": np.array([[999, 1, 1, 0.5, 0.5]])}, "opinions names a choice"),
+        ({"opinions": np.array([[0, -1, 1, 0.5, 0.5]])}, "opinions names a choice"),
     ],
 )
 def test_arrays_that_do_not_fit_are_named(folder: Path, changes: dict[str, np.ndarray], words: str) -> None:

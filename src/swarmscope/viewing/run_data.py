@@ -254,7 +254,20 @@ def _value_fault(trajectory: Trajectory, robots: int) -> str:
     limits = np.array([trajectory.t_s.size, robots, robots])
     if np.any(trajectory.links[:, :3] < 0) or np.any(trajectory.links[:, :3] >= limits):
         return "links names a tick or a robot that does not exist"
+    return _choice_fault(trajectory, robots)
+
+
+def _choice_fault(trajectory: Trajectory, robots: int) -> str:
+    choices, opinions = trajectory.choices, trajectory.opinions
+    if not _are_indices(choices[:, :2], np.array([trajectory.t_s.size, robots])):
+        return "choices names a tick or a robot that does not exist"
+    if not _are_indices(opinions[:, :2], np.array([len(choices), np.inf])):  # neighbours may be strangers
+        return "opinions names a choice that does not exist, or no address"
     return ""
+
+
+def _are_indices(values: Array, limits: Array) -> bool:
+    return bool(np.all((values >= 0) & (values < limits) & (values == np.floor(values))))
 
 
 _KEY_FIGURES: tuple[tuple[str, str, str], ...] = (
