@@ -55,6 +55,7 @@ StorePath = Annotated[Path | None, typer.Option(help="File with the results, els
 ReportOut = Annotated[Path | None, typer.Option(help="Folder of the report, else runs/<name>/report.")]
 
 
+Close = Annotated[bool, typer.Option("--close", help="Draw where robots have been, not the whole world.")]
 NoCode = Annotated[bool, typer.Option("--no-code", help="Refuse planners and tasks in FILE.py of somebody's own.")]
 
 
@@ -193,13 +194,14 @@ def perceive(
 def replay(
     run_dir: Annotated[Path, typer.Argument(help="A run folder.")],
     open_: Annotated[bool, typer.Option("--open", help="Open the page in the browser.")] = False,
+    close: Close = False,
 ) -> None:
     """Make the replay page and the picture of a run folder anew."""
     from swarmscope.viewing.pictures import write_picture
     from swarmscope.viewing.replay import write_replay
 
     page = write_replay(run_dir)
-    typer.echo(str(write_picture(run_dir)))
+    typer.echo(str(write_picture(run_dir, close)))
     typer.echo(str(page))
     if open_:
         typer.launch(page.resolve().as_uri())
@@ -238,12 +240,13 @@ def video(
     fps: Annotated[int, typer.Option(min=1, max=50, help="Frames per second.")] = 20,
     size: Annotated[int, typer.Option(min=200, max=2160, help="Longer side of the picture, pixels.")] = 800,
     scans: Annotated[bool, typer.Option(help="Draw scans and safe directions.")] = True,
+    close: Close = False,
 ) -> None:
     """Make a video of a run folder: robots, their ways, scans, safe directions and packets."""
     from swarmscope.cli.video import video_command
     from swarmscope.viewing.video.write import Film
 
-    video_command(run_dir, out, Film(speed, fps, size, scans))
+    video_command(run_dir, out, Film(speed, fps, size, scans, close))
 
 
 @app.command(

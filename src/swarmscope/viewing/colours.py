@@ -10,6 +10,7 @@ SOLID, SOLID_EDGE = "#c9d2c4", "#a4b19d"
 WALL = "#8c9a86"
 CRASH = "#c23b22"
 SAFE = "#0f8a6a"
+PACKET = "#3d8f7d"
 
 
 def robot_colours(robots: int) -> npt.NDArray[np.float64]:

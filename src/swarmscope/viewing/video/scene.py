@@ -25,16 +25,16 @@ NARROWEST = 420
 
 
 class Scene:
-    """The world of a run on ``size`` pixels, its longer side."""
+    """The world of a run on ``size`` pixels, its longer side; ``close``: where the robots have been."""
 
-    def __init__(self, run: RunData, size: int, scans: bool, speed: float) -> None:
+    def __init__(self, run: RunData, size: int, scans: bool, speed: float, close: bool = False) -> None:
         import matplotlib as mpl
 
         self._run, self._scans, self._speed = run, scans, speed
         self.moments = Moments(run)
         with mpl.rc_context():
             mpl.rcdefaults()
-            self._build(size)
+            self._build(size, close)
 
     def frame(self, t_s: float) -> Frame:
         """Return the picture of a moment, (H, W, 3)."""
@@ -45,11 +45,11 @@ class Scene:
         picture: Frame = np.asarray(self._canvas.buffer_rgba())[..., :3].copy()
         return picture
 
-    def _build(self, size: int) -> None:
+    def _build(self, size: int, close: bool) -> None:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
 
-        x0, y0, x1, y1 = extent = extent_of(self._run)
+        x0, y0, x1, y1 = extent = extent_of(self._run, close)
         scale = min((size - LEFT - RIGHT) / (x1 - x0), (size - BELOW - ABOVE) / (y1 - y0))
         wanted = max((x1 - x0) * scale + LEFT + RIGHT, NARROWEST), (y1 - y0) * scale + BELOW + ABOVE
         width, height = (2 * round(0.5 * length) for length in wanted)  # H.264 takes even lengths only

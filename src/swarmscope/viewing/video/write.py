@@ -41,6 +41,8 @@ class Film(NamedTuple):
     """Longer side of the picture [pixels]."""
     scans: bool = True
     """Whether scans and safe directions are drawn."""
+    close: bool = False
+    """Whether only that is shown where the robots have been, instead of the whole world."""
 
 
 USUAL = Film()
@@ -65,7 +67,7 @@ def write_video(
     check_film(path, film)
     run = load_run(run_dir)
     speed = film.speed or usual_speed(float(run.trajectory.t_s[-1] - run.trajectory.t_s[0]))
-    scene = Scene(run, film.size, film.scans, speed)
+    scene = Scene(run, film.size, film.scans, speed, film.close)
     times = moments_of(scene.moments.begin_s, scene.moments.end_s, speed, film.fps)
     first = scene.frame(times[0])
     _check_size(path, len(times), first)
