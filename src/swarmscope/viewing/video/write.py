@@ -109,8 +109,13 @@ def _counted(frames: Iterator[Frame], total: int, progress: Callable[[int, int],
 
 
 def _palette(frames: list[Frame]) -> Image.Image:
-    """Return the colours that all frames share, so that what does not move is the same in each."""
-    return Image.fromarray(np.concatenate(frames)).quantize(255, method=Image.Quantize.MEDIANCUT)
+    """Return the colours that all frames share: those that are frequent, and those that are far from all others."""
+    picture, colours = Image.fromarray(np.concatenate(frames)), []
+    for count, method in ((128, Image.Quantize.MEDIANCUT), (127, Image.Quantize.MAXCOVERAGE)):
+        colours += (picture.quantize(count, method=method).getpalette() or [])[: 3 * count]
+    shared = Image.new("P", (1, 1))
+    shared.putpalette(colours)
+    return shared
 
 
 def _write_gif(path: Path, frames: Iterator[Frame], total: int, fps: int, palette: Image.Image) -> None:
