@@ -13,6 +13,7 @@ from swarmscope.judging.run import place_name
 from swarmscope.scenarios.scenario import Scenario
 from swarmscope.user_files import short_name
 
+_shown: list[Progress] = []
 QUIET_S = 2.0
 """What takes longer shows how far it is."""
 
@@ -49,6 +50,8 @@ def _bar(words: str, total: float | None, after_s: float) -> Iterator[Callable[.
 
     def show_when_due() -> None:
         if not bar.live.is_started and time.monotonic() - begun >= after_s:
+            _stop_all()
+            _shown.append(bar)
             bar.start()
 
     def show(done: float, note: str, of: float | None = total) -> None:
@@ -59,5 +62,11 @@ def _bar(words: str, total: float | None, after_s: float) -> Iterator[Callable[.
     try:
         yield show
     finally:
-        if bar.live.is_started:
-            bar.stop()
+        if bar in _shown:
+            _stop_all()
+
+
+def _stop_all() -> None:
+    """Take what is shown off the screen: a bar within another's time takes its place (rich before 14.1 shows one)."""
+    while _shown:
+        _shown.pop().stop()
