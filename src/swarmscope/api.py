@@ -28,15 +28,13 @@ from swarmscope.sim.world import WorldSpec
 from swarmscope.tasks import Setup
 from swarmscope.viewing.frames import as_frame, check_frame, robot_columns, tick_columns
 from swarmscope.viewing.pictures import write_picture
-from swarmscope.viewing.progress import progress_bar
+from swarmscope.viewing.progress import QUIET_S, progress_bar
 from swarmscope.viewing.replay import write_replay
 from swarmscope.viewing.run_data import load_run as read_run
 from swarmscope.viewing.trace import Trace
 
 Place = str | Path | Mapping[str, Any] | Scenario
 """Where to run: the name of a task, a scenario file (.yaml), or a scenario, checked or not."""
-QUIET_S = 2.0
-"""A run that takes longer shows how far it is."""
 KEY_FIGURES = (
     ("arrival_rate", "{:.1%} arrived"),
     ("collisions", "{:.0f} collisions"),

@@ -15,7 +15,7 @@ from swarmscope.cli.main import app
 from swarmscope.sim.scan_files import SCAN_FOLDER
 
 SCANS = "malaga_telecom_2006_sick_lms"
-COMMANDS = ("run", "perceive", "replay", "planners", "tasks")
+COMMANDS = ("run", "perceive", "replay", "mcap", "video", "planners", "tasks")
 
 
 def test_perceive_takes_the_packaged_scans_and_writes_features_and_picture(tmp_path):

@@ -127,7 +127,7 @@ def _walk(starts, goals, ticks, beams, crashed) -> dict[str, np.ndarray]:
     beam_angles = -math.pi + np.arange(beams) * 2 * math.pi / beams
     pose, side = starts.copy(), np.zeros(n, int)
     p_left, sent = np.full(n, np.nan), np.zeros(n, int)
-    arrival, links = np.full(n, np.nan), []
+    arrival, links, choices, opinions = np.full(n, np.nan), [], [], []
     for k in range(ticks):
         before = pose.copy()
         for i in range(n):
@@ -162,10 +162,13 @@ def _walk(starts, goals, ticks, beams, crashed) -> dict[str, np.ndarray]:
                 p_left[i] = 0.5 + 0.4 * math.sin(3.7 * i + 0.9 * k)
                 side[i] = 1 if p_left[i] >= 0.5 else -1
                 state, reason = 1, 1
+                choices.append([k, i, 0.5, p_left[i], side[i], 0])
                 for j in np.flatnonzero((distance > 0.9) & (distance < 2.7)):
                     size = 18 + 4 * int(np.count_nonzero(np.diff(ranges[np.isfinite(ranges)]) > 0.2))
                     links.append([k, j, i, size])
                     sent[j] += size
+                    choices[-1][-1] += 1
+                    opinions.append([len(choices) - 1, j, 1 if j > i else -1, 0.25 + 0.125 * (j % 5), 0.5])
             else:
                 state, reason = 2, 2
             if speed:
@@ -189,6 +192,8 @@ def _walk(starts, goals, ticks, beams, crashed) -> dict[str, np.ndarray]:
         "state_names": np.array(STATES),
         "reason_names": np.array(REASONS),
         "links": np.array(links, np.int32).reshape(-1, 4),
+        "choices": np.array(choices, float).reshape(-1, 6),
+        "opinions": np.array(opinions, float).reshape(-1, 5),
         "arrival_s": arrival,
         "collided": collided,
         "range_max_m": np.array(RANGE_MAX),

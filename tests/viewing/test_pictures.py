@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from PIL import Image
 
 from swarmscope.errors import InputFileError
 from swarmscope.sim.world import grid_from_solid
-from swarmscope.viewing.pictures import write_picture
+from swarmscope.viewing.pictures import extent_of, write_picture
 from swarmscope.viewing.run_data import (
     WorldFile,
     crash_ticks,
@@ -77,6 +78,29 @@ def test_of_a_map_only_the_free_part_is_shown(yaw) -> None:
     assert shown_bounds(world.model_copy(update={"obstacles": []})) == world.bounds
 
 
+def test_close_pictures_show_where_robots_have_been(folder: Path) -> None:
+    """1.5 m round everything, which is ten radii; else the whole world."""
+    run = load_run(folder)
+    x = np.concatenate([run.trajectory.x_m.ravel(), [robot.goal[0] for robot in run.world.robots]])
+    y = np.concatenate([run.trajectory.y_m.ravel(), [robot.goal[1] for robot in run.world.robots]])
+    box = (x.min() - 1.5, y.min() - 1.5, x.max() + 1.5, y.max() + 1.5)
+    assert extent_of(run, close=True) == pytest.approx(box)
+    without_map = replace(run, world=run.world.model_copy(update={"obstacles": []}))
+    assert extent_of(without_map) == pytest.approx((0.0, 0.0, 12.0, max(8.0, y.max() + 0.3)))
+
+
+def test_picture_shows_packets(folder: Path) -> None:
+    """Green as it looks on the ground, in the picture of a run in which features were sent, else nowhere."""
+    green = (0.55 * np.array([0x3D, 0x8F, 0x7D]) + 0.45 * np.array([0xFB, 0xFA, 0xF7])).round()
+    counts = []
+    for links in (load_run(folder).trajectory.links, np.zeros((0, 4), np.int32)):
+        rewrite_arrays(folder, links=links)
+        with Image.open(write_picture(folder)) as picture:
+            pixels = np.asarray(picture.convert("RGB")).astype(float)
+        counts.append(int((np.abs(pixels - green).max(axis=2) < 6).sum()))
+    assert counts[0] > 200 and counts[1] < 20
+
+
 def test_no_half_written_files_stay(folder: Path) -> None:
     before = {entry.name for entry in folder.iterdir()}
     write_picture(folder)
@@ -138,6 +162,11 @@ def test_damaged_files_are_named(folder: Path, name: str, damage: str) -> None:
         ({"links": np.array([[0, 6, 1, 20]])}, "links"),
         ({"scan_u8": np.zeros((60, 6, 71), np.uint8)}, "scan_u8"),
         ({"state": np.full((60, 6), "advance")}, "state"),
+        ({"choices": np.array([[60, 0, 0.5, 0.5, 1, 0]])}, "choices names a tick or a robot"),
+        ({"choices": np.array([[1, 0.5, 0.5, 0.5, 1, 0]])}, "choices names a tick or a robot"),
+        ({"choices": np.array([[1, np.nan, 0.5, 0.5, 1, 0]])}, "choices names a tick or a robot"),
+        ({"opinions": np.array([[999, 1, 1, 0.5, 0.5]])}, "opinions names a choice"),
+        ({"opinions": np.array([[0, -1, 1, 0.5, 0.5]])}, "opinions names a choice"),
     ],
 )
 def test_arrays_that_do_not_fit_are_named(folder: Path, changes: dict[str, np.ndarray], words: str) -> None:

@@ -244,6 +244,32 @@ def test_messages_are_drawn_when_they_flow(page: Any, folder: Path) -> None:
         find(page, "show-links").click()
 
 
+def test_who_said_what_when_a_side_was_chosen(page: Any, folder: Path) -> None:
+    """The panel lists own opinion, those heard and the sum; lines are drawn for a moment; C goes to the next choice."""
+    with np.load(folder / "trajectory.npz") as recorded:
+        choices, opinions, t_s = recorded["choices"], recorded["opinions"], recorded["t_s"]
+    row = int(np.flatnonzero(choices[:, 5] >= 2)[0])
+    tick, robot, _, p_left, side, _ = choices[row]
+    at_s = float(t_s[int(tick)])
+    page.execute_script("swarmscope.select(arguments[0])", int(robot))
+    seek(page, at_s + 0.1)
+    wait_for(lambda: f"Chose {'left' if side > 0 else 'right'} at {at_s:.1f} s" in find(page, "panel").text)
+    lines = find(page, "panel").find_element("class name", "votes").text.splitlines()
+    wanted = ["itself 0.500"]
+    for _, heard, where, p, weight in opinions[opinions[:, 0] == row]:
+        wanted.append(f"robot {heard:.0f} {'left' if where > 0 else 'right'} {p:.3f} {weight:.3f}")
+    assert lines[2:] == [*wanted, f"together {p_left:.3f}"]
+    shown = pixels(page)
+    find(page, "show-votes").click()
+    assert pixels(page) != shown
+    find(page, "show-votes").click()
+    mine = sorted(t_s[choices[choices[:, 1] == robot, 0].astype(int)])
+    page.execute_script("document.activeElement.blur(); swarmscope.seek(0)")
+    press(page, "c")
+    first = next(t for t in mine if t > 0.0)
+    assert ask(page, "swarmscope.time()") == pytest.approx(first)
+
+
 @pytest.mark.parametrize("width", [340, 700, 1600])
 def test_nothing_sticks_out_at_any_width(page: Any, width: int) -> None:
     size = {"width": width, "height": 800, "deviceScaleFactor": 2, "mobile": False}

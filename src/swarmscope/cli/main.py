@@ -55,6 +55,7 @@ StorePath = Annotated[Path | None, typer.Option(help="File with the results, els
 ReportOut = Annotated[Path | None, typer.Option(help="Folder of the report, else runs/<name>/report.")]
 
 
+Close = Annotated[bool, typer.Option("--close", help="Draw where robots have been, not the whole world.")]
 NoCode = Annotated[bool, typer.Option("--no-code", help="Refuse planners and tasks in FILE.py of somebody's own.")]
 
 
@@ -125,16 +126,20 @@ def run(
     force: Annotated[bool, typer.Option("--force", help="Write over the run of another scenario.")] = False,
     threads: Annotated[int, typer.Option(min=1, max=256, help="Threads; the result is the same.")] = 1,
     pictures: Annotated[bool, typer.Option(help="Make paths.png and replay.html.")] = True,
+    mcap: Annotated[
+        bool, typer.Option("--mcap", help="Make run.mcap, too: ROS 2 messages for Foxglove, Rerun, rosbag2.")
+    ] = False,
     no_code: NoCode = False,
 ) -> None:
     """Run one scenario to a folder: metrics, trajectory, world, a picture, a replay page."""
-    from swarmscope.cli.run import run_command
+    from swarmscope.cli.run import Make, run_command
 
     place: dict[str, Any] = {"resolution_m": resolution, "number": number, "trips": trips, "first_trip": first_trip}
     place |= {"starts": start, "goals": goal}
     options: dict[str, Any] = {"robots": robots, "seed": seed, "limit_s": limit}
     options |= {f"map.{key}": value for key, value in place.items()}
-    run_command(scenario, task, map_, planner, options, set_ or [], out, threads, pictures, not no_code, force)
+    make = Make(pictures, mcap)
+    run_command(scenario, task, map_, planner, options, set_ or [], out, threads, make, not no_code, force)
 
 
 @app.command(
@@ -189,16 +194,59 @@ def perceive(
 def replay(
     run_dir: Annotated[Path, typer.Argument(help="A run folder.")],
     open_: Annotated[bool, typer.Option("--open", help="Open the page in the browser.")] = False,
+    close: Close = False,
 ) -> None:
     """Make the replay page and the picture of a run folder anew."""
     from swarmscope.viewing.pictures import write_picture
     from swarmscope.viewing.replay import write_replay
 
     page = write_replay(run_dir)
-    typer.echo(str(write_picture(run_dir)))
+    typer.echo(str(write_picture(run_dir, close)))
     typer.echo(str(page))
     if open_:
         typer.launch(page.resolve().as_uri())
+
+
+@app.command(
+    epilog="Examples:\n\n"
+    "[bold]swarmscope mcap runs/first[/bold]\n\n"
+    "[bold]swarmscope mcap runs/first --out forest.mcap; ros2 bag play forest.mcap[/bold]"
+)
+def mcap(
+    run_dir: Annotated[Path, typer.Argument(help="A run folder.")],
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="MCAP file, else run.mcap in the folder.")] = None,
+    threads: Annotated[int, typer.Option(min=1, max=256, help="Threads; the result is the same.")] = 1,
+    no_code: NoCode = False,
+) -> None:
+    """Play a run again and write all that its robots saw and did as ROS 2 messages (Foxglove, Rerun, rosbag2)."""
+    from swarmscope.cli.mcap import mcap_command
+
+    mcap_command(run_dir, out, threads, not no_code)
+
+
+@app.command(
+    epilog="Examples:\n\n"
+    "[bold]swarmscope video runs/first[/bold]\n\n"
+    "[bold]swarmscope video runs/first -o forest.mp4 --speed 4 --fps 30 --size 1080[/bold]"
+)
+def video(
+    run_dir: Annotated[Path, typer.Argument(help="A run folder.")],
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="A .gif, or an .mp4 (extra video); else video.gif in the folder.")
+    ] = None,
+    speed: Annotated[
+        float | None, typer.Option(help="Seconds of the run in one of the video, else so that it takes half a minute.")
+    ] = None,
+    fps: Annotated[int, typer.Option(min=1, max=50, help="Frames per second.")] = 20,
+    size: Annotated[int, typer.Option(min=200, max=2160, help="Longer side of the picture, pixels.")] = 800,
+    scans: Annotated[bool, typer.Option(help="Draw scans and safe directions.")] = True,
+    close: Close = False,
+) -> None:
+    """Make a video of a run folder: robots, their ways, scans, safe directions and packets."""
+    from swarmscope.cli.video import video_command
+    from swarmscope.viewing.video.write import Film
+
+    video_command(run_dir, out, Film(speed, fps, size, scans, close))
 
 
 @app.command(

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from rich.console import Console
@@ -15,13 +16,16 @@ from swarmscope.cli._code import announce, files_of, refuse_code
 from swarmscope.cli._console import PlainConsole
 from swarmscope.errors import ConfigError
 from swarmscope.experiments.warm_up import kernels_are_cold
-from swarmscope.judging.run import run_scenario
+from swarmscope.judging.run import Watch, run_scenario
 from swarmscope.judging.run_folder import check_out, check_same
 from swarmscope.judging.run_names import usual_folder
 from swarmscope.scenarios.overrides import PLACES, choose, set_key, set_path
 from swarmscope.scenarios.read import parse_scenario, read_scenario_file
 from swarmscope.scenarios.scenario import Scenario
 from swarmscope.scenarios.to_kernels import complete
+from swarmscope.viewing.bag.exact import Exact
+from swarmscope.viewing.bag.make import NAME as MCAP
+from swarmscope.viewing.bag.make import adder, check_packages
 from swarmscope.viewing.progress import progress_bar
 
 MOST_FAILURES = 10
@@ -49,6 +53,13 @@ ROWS = (
 )
 
 
+class Make(NamedTuple):
+    """What a run folder is to hold beside the results."""
+
+    pictures: bool = True
+    mcap: bool = False
+
+
 def run_command(
     file: Path | None,
     task: str | None,
@@ -58,11 +69,13 @@ def run_command(
     changes: list[str],
     out: Path | None,
     threads: int,
-    pictures: bool,
+    make: Make,
     code: bool = True,
     force: bool = False,
 ) -> None:
     """Run what the command line asks for and print what came out."""
+    if make.mcap:
+        check_packages()
     scenario = read_options(file, task, map_, planner, options, changes)
     files = files_of([scenario])
     if not code:
@@ -74,12 +87,27 @@ def run_command(
     announce(files)
     if kernels_are_cold(scenario.planner.name):
         print("compiling the kernels for the first time (about 40 s, kept on disk) ...", file=sys.stderr)
+    exact = Exact() if make.mcap else None
     with progress_bar(scenario) as progress:
-        metrics = run_scenario(scenario, place, threads, progress, add_pictures if pictures else None)
+        metrics = run_scenario(scenario, place, threads, progress, *_extras(make, exact))
     print_metrics(PlainConsole(), metrics)
     print_failures(metrics["failures"])
-    for name in ("paths.png", "replay.html") if pictures else ("metrics.json",):
+    made = ["paths.png", "replay.html"] if make.pictures else ["metrics.json"]
+    for name in [*made, MCAP] if make.mcap else made:
         print(place / name)
+
+
+def _extras(make: Make, exact: Exact | None) -> tuple[Callable[[Path], None], Watch]:
+    """Return what adds to the folder what was asked for, and who looks on for that."""
+    steps: list[Callable[[Path], None]] = [add_pictures] if make.pictures else []
+    if exact is not None:
+        steps.append(adder(exact))
+
+    def extras(folder: Path) -> None:
+        for step in steps:
+            step(folder)
+
+    return extras, Watch() if exact is None else exact.watch
 
 
 def _set_option(values: dict[str, Any], key: str, value: Any) -> None:

@@ -33,7 +33,7 @@ from swarmscope.scenarios.places import make_setup
 from swarmscope.scenarios.read import user_files_of
 from swarmscope.scenarios.scenario import Scenario
 from swarmscope.scenarios.to_kernels import complete, make_setting
-from swarmscope.sim.loop import Setting, Trace, run
+from swarmscope.sim.loop import Between, Sensed, Setting, Trace, run
 from swarmscope.tasks import Setup
 from swarmscope.tasks._check import ARRIVE_M
 from swarmscope.user_files import short_name, text_of
@@ -67,26 +67,46 @@ class Outcome:
     references: References
 
 
+class Watch(NamedTuple):
+    """Who looks on while a run is played, without a part in it (``sim/loop.py``)."""
+
+    between: Between | None = None
+    sensed: Sensed | None = None
+
+
+NOBODY = Watch()
+
+
 def play(
     scenario: Scenario,
     threads: int = 1,
     progress: Callable[[float, int], None] | None = None,
     any_angle: bool = True,
     references: References | None = None,
+    watch: Watch = NOBODY,
 ) -> Outcome:
     """Run the scenario and find the reference ways; ``progress(simulated seconds, robots done)``.
 
-    ``references`` of the same world are taken as they are. The side of the shortest way is found for planners that
-    are oracles, and where the scenario says ``judge_sides``: then it is noted beside every choice.
+    ``references`` of the same world are taken as they are.
     """
     setup = make_setup(scenario)
-    setting = make_setting(scenario, setup, threads)
-    if scenario.judge_sides or setting.planner.told:
-        setting = replace(setting, advice=make_advice(setup, *judged_by(scenario, setting.rig)))
-    trace = run(setting, progress)
+    setting = judged_setting(scenario, setup, threads)
+    trace = run(setting, progress, *watch)
     if references is None:
         references = reference_ways(setup, scenario.radii_m, any_angle)
     return Outcome(scenario, setup, setting, trace, references)
+
+
+def judged_setting(scenario: Scenario, setup: Setup, threads: int = 1) -> Setting:
+    """Return the run of ``scenario`` in ``setup``, ready for the kernels and for judging.
+
+    The side of the shortest way is found for planners that are oracles, and where the scenario says ``judge_sides``:
+    then it is noted beside every choice.
+    """
+    setting = make_setting(scenario, setup, threads)
+    if scenario.judge_sides or setting.planner.told:
+        return replace(setting, advice=make_advice(setup, *judged_by(scenario, setting.rig)))
+    return setting
 
 
 def run_scenario(
@@ -95,10 +115,11 @@ def run_scenario(
     threads: int = 1,
     progress: Callable[[float, int], None] | None = None,
     extras: Callable[[Path], None] | None = None,
+    watch: Watch = NOBODY,
 ) -> dict[str, Any]:
     """Run the scenario into the run folder ``out`` and return its metrics; ``extras`` adds pictures to it."""
     check_out(out)
-    found = contents(play(scenario, threads, progress))
+    found = contents(play(scenario, threads, progress, watch=watch))
     write_run(out, *found, extras)
     return found.metrics
 
@@ -221,9 +242,9 @@ def world_table(outcome: Outcome) -> dict[str, Any]:
 
 def trajectory(outcome: Outcome) -> dict[str, np.ndarray]:
     """Return the arrays of ``trajectory.npz`` (docs/architecture.md)."""
-    trace, rig = outcome.trace, outcome.setting.rig
+    trace, beams = outcome.trace, outcome.setting.beams
     records = trace.records
-    angles = rig.sensor.angle_min + rig.sensor.increment * np.arange(rig.sensor.beams)
+    angles = beams.angle_min + beams.increment * np.arange(beams.cos.size)
     return {
         "t_s": trace.t_s,
         "x_m": records.x,
@@ -247,7 +268,7 @@ def trajectory(outcome: Outcome) -> dict[str, np.ndarray]:
         "opinions": opinions_table(trace.choices),
         "arrival_s": trace.robots["arrival_s"].copy(),
         "collided": trace.robots["crashed"].copy(),
-        "range_max_m": np.array(rig.sensor.range_max),
+        "range_max_m": np.array(beams.range_max),
     }
 
 

@@ -29,6 +29,8 @@ from swarmscope.sim.scan_files import read_npz
 CONFIG, WORLD, TRAJECTORY, METRICS = "config.yaml", "world.json", "trajectory.npz", "metrics.json"
 REQUIRED = frozenset({CONFIG, WORLD, TRAJECTORY, METRICS})
 RUN_FILES = REQUIRED | {"paths.png", "replay.html"}
+ASKED_FILES = frozenset({"run.mcap", "video.gif", "video.mp4"})
+"""What a run folder holds only where somebody asked for it."""
 USER_FILES = frozenset({"planner.py", "task.py"})
 """Copies of a user's files that were run; nothing runs them again."""
 YAML_END = "...\n"
@@ -48,7 +50,7 @@ def write_run(
     """Write a complete run folder at ``out`` and return its path; an earlier run there is replaced last.
 
     ``files`` are texts of ``USER_FILES``. ``extras`` is called with the unfinished folder to add the other
-    ``RUN_FILES``. When anything fails,
+    ``RUN_FILES`` and ``ASKED_FILES``. When anything fails,
     nothing of the new run stays and the earlier run is as it was.
     """
     place = _place(out)
@@ -140,7 +142,7 @@ def _refuse_foreign(place: Path) -> None:
     if not place.is_dir():
         raise ConfigError(str(place), "is a file; a run is written into a folder of its own")
     names = {entry.name for entry in place.iterdir() if not LEFTOVER.fullmatch(entry.name)}
-    foreign = sorted(names - RUN_FILES - USER_FILES)
+    foreign = sorted(names - RUN_FILES - ASKED_FILES - USER_FILES)
     if foreign:
         raise ConfigError(
             str(place), f"holds '{foreign[0]}', which is no part of a run; refusing to overwrite it"
@@ -171,9 +173,9 @@ def _write_all(
     if extras is not None:
         extras(folder)  # pictures of a run whose data are complete; the folder itself is not in place yet
     names = {entry.name for entry in folder.iterdir()}
-    if not names <= RUN_FILES | USER_FILES:
-        odd = sorted(names - RUN_FILES - USER_FILES)
-        raise ValueError(f"extras wrote {odd}; a run folder holds {sorted(RUN_FILES)}")
+    odd = sorted(names - RUN_FILES - ASKED_FILES - USER_FILES)
+    if odd:
+        raise ValueError(f"extras wrote {odd}; a run folder holds {sorted(RUN_FILES | ASKED_FILES)}")
     for name in names:
         _sync(folder / name)
     _sync(folder)

@@ -178,16 +178,22 @@ def _sense_next(sim: Sim, tick: int) -> bool:
     return False
 
 
+Sensed = Callable[[Held[Sim], int], None]
+"""``(held, tick)``, called when everybody has sensed and nobody has decided yet: deciding mends the scans in place."""
 Between = Callable[[Held[Sim], int], bool]
 """``(held, tick)``, called when everybody has decided and nothing has been sent or driven yet; True: the last tick."""
 
 
 def run(
-    setting: Setting, progress: Callable[[float, int], None] | None = None, between: Between | None = None
+    setting: Setting,
+    progress: Callable[[float, int], None] | None = None,
+    between: Between | None = None,
+    sensed: Sensed | None = None,
 ) -> Trace:
     """Run to the end; ``progress(simulated seconds, robots done)`` is called every now and then.
 
-    ``between`` looks at every tick, may throw packets at robots (`radio.throw_all`), and may end the run with it.
+    ``between`` looks at every tick, may throw packets at robots (`radio.throw_all`), and may end the run with it;
+    ``sensed`` looks at every scan as it was measured.
 
     The result does not depend on ``threads``: every kernel writes only its own robots' rows, random numbers
     are keyed, and what robots do to each other (radio, contacts) happens in the order of the robots.
@@ -214,10 +220,9 @@ def run(
         row = tick % CHUNK
         if row == 0:
             chunks.append(new_records(min(CHUNK, ticks - tick), n, beams))
-        if setting.advice is not None:
-            tell_sides(sim, setting.advice)
-            if setting.planner.is_told:
-                memory["told"] = sim.told
+        if sensed is not None:
+            sensed(held, tick)
+        _tell(setting, sim, memory)
         if tick % sample_every == 0:
             plan_us += _time_steps(step_all, n)
         else:
@@ -276,6 +281,15 @@ def _stepper(setting: Setting, swarm: Swarm, memory: np.ndarray) -> Callable[[in
                 setting.planner.step_all(begin, end, held, memory, setting.params)
 
     return step_all
+
+
+def _tell(setting: Setting, sim: Sim, memory: np.ndarray) -> None:
+    """Find the sides of the shortest ways, if that is wanted, and tell them planners that may look."""
+    if setting.advice is None:
+        return
+    tell_sides(sim, setting.advice)
+    if setting.planner.is_told:
+        memory["told"] = sim.told
 
 
 def _time_steps(step_all: Callable[[int, int], None], robots: int) -> list[float]:

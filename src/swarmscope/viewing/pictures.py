@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from swarmscope.sim.world import Circle, Grid, Obstacle, Polygon, Wall
+from swarmscope.viewing.colours import CRASH, FAINT, GROUND, INK, PACKET, SOLID, SOLID_EDGE, WALL, robot_colours
 from swarmscope.viewing.run_data import (
     RunData,
     crash_ticks,
@@ -27,36 +28,41 @@ if TYPE_CHECKING:
 LONG_SIDE_IN = 9.0
 """Longer side of the drawn world on paper [inch]."""
 
+CLOSE_RADII = 10.0
+"""What is shown round the robots' ways in a picture of only those, radii of a robot."""
+PACKET_OPACITY, FEW_PACKETS = 0.55, 150
+"""Of the line that stands for a packet; up to so many are drawn alike."""
+
 MOST_NUMBERS = 60
 """More robots have no numbers in the picture: one could not read them."""
 
-INK, FAINT, GROUND = "#2b333b", "#7b8590", "#fbfaf7"
-SOLID, SOLID_EDGE = "#c9d2c4", "#a4b19d"
-CRASH = "#c23b22"
 
+def write_picture(run_dir: Path, close: bool = False) -> Path:
+    """Write ``paths.png`` into the run folder and return its path; the same run gives the same bytes.
 
-def write_picture(run_dir: Path) -> Path:
-    """Write ``paths.png`` into the run folder and return its path; the same run gives the same bytes."""
+    ``close`` shows where the robots have been instead of the whole world.
+    """
     run = load_run(run_dir)
-    return replace_file(run.folder / "paths.png", _render(run))
+    return replace_file(run.folder / "paths.png", _render(run, close))
 
 
-def _render(run: RunData) -> bytes:
+def _render(run: RunData, close: bool) -> bytes:
     import matplotlib as mpl
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     with mpl.rc_context():
         mpl.rcdefaults()
-        extent = _extent(run)
+        extent = extent_of(run, close)
         width, height = extent[2] - extent[0], extent[3] - extent[1]
         inch = LONG_SIDE_IN / max(width, height)
         size = (max(6.0, width * inch) + 1.0, max(2.5, height * inch) + 1.7)
         figure = Figure(figsize=size, dpi=150, facecolor="white")
         FigureCanvasAgg(figure)
         axes = figure.add_axes((0.7 / size[0], 1.15 / size[1], 1.0 - 1.0 / size[0], 1.0 - 1.7 / size[1]))
-        _draw_frame(axes, extent)
-        _draw_obstacles(axes, run.world.obstacles)
+        draw_frame(axes, extent)
+        draw_obstacles(axes, run.world.obstacles)
+        _draw_packets(axes, run)
         _draw_robots(axes, run)
         _draw_words(axes, figure, run)
         buffer = io.BytesIO()
@@ -64,17 +70,20 @@ def _render(run: RunData) -> bytes:
     return buffer.getvalue()
 
 
-def _extent(run: RunData) -> tuple[float, float, float, float]:
-    """Return x0, y0, x1, y1 [m] around what is worth looking at and everything a robot did."""
-    x0, y0, x1, y1 = shown_bounds(run.world)
-    margin = 2.0 * max(robot.radius for robot in run.world.robots)
+def extent_of(run: RunData, close: bool = False) -> tuple[float, float, float, float]:
+    """Return x0, y0, x1, y1 [m] around what is worth looking at and everything a robot did, ``close``: only this."""
+    margin = (CLOSE_RADII if close else 2.0) * max(robot.radius for robot in run.world.robots)
     xs = np.concatenate([run.trajectory.x_m.ravel(), [robot.goal[0] for robot in run.world.robots]])
     ys = np.concatenate([run.trajectory.y_m.ravel(), [robot.goal[1] for robot in run.world.robots]])
-    low = min(x0, float(xs.min()) - margin), min(y0, float(ys.min()) - margin)
-    return *low, max(x1, float(xs.max()) + margin), max(y1, float(ys.max()) + margin)
+    low, high = (xs.min() - margin, ys.min() - margin), (xs.max() + margin, ys.max() + margin)
+    if not close:
+        x0, y0, x1, y1 = shown_bounds(run.world)
+        low, high = (min(x0, low[0]), min(y0, low[1])), (max(x1, high[0]), max(y1, high[1]))
+    return float(low[0]), float(low[1]), float(high[0]), float(high[1])
 
 
-def _draw_frame(axes: Axes, extent: tuple[float, float, float, float]) -> None:
+def draw_frame(axes: Axes, extent: tuple[float, float, float, float]) -> None:
+    """Draw the ground and the scales of ``extent`` x0, y0, x1, y1 [m]."""
     axes.set_xlim(extent[0], extent[2])
     axes.set_ylim(extent[1], extent[3])
     axes.set_aspect("equal")
@@ -86,7 +95,8 @@ def _draw_frame(axes: Axes, extent: tuple[float, float, float, float]) -> None:
         spine.set_color("#d5d8da")
 
 
-def _draw_obstacles(axes: Axes, obstacles: list[Obstacle]) -> None:
+def draw_obstacles(axes: Axes, obstacles: list[Obstacle]) -> None:
+    """Draw what stands in the world."""
     from matplotlib import patches
     from matplotlib.collections import LineCollection, PatchCollection
 
@@ -100,7 +110,7 @@ def _draw_obstacles(axes: Axes, obstacles: list[Obstacle]) -> None:
             _draw_grid(axes, obstacle)
     axes.add_collection(PatchCollection(solids, facecolor=SOLID, edgecolor=SOLID_EDGE, linewidth=0.8))
     walls = [obstacle.points for obstacle in obstacles if isinstance(obstacle, Wall)]
-    axes.add_collection(LineCollection(walls, colors="#8c9a86", linewidths=2.2, capstyle="round"))
+    axes.add_collection(LineCollection(walls, colors=WALL, linewidths=2.2, capstyle="round"))
 
 
 def _draw_grid(axes: Axes, grid: Grid) -> None:
@@ -114,11 +124,20 @@ def _draw_grid(axes: Axes, grid: Grid) -> None:
     axes.add_collection(PolyCollection(list(turned), color=SOLID, lw=0.2))
 
 
-def _draw_robots(axes: Axes, run: RunData) -> None:
-    from matplotlib import colormaps
+def _draw_packets(axes: Axes, run: RunData) -> None:
+    """Draw a line from sender to receiver of each packet of features, fainter where there are many."""
+    from matplotlib.collections import LineCollection
 
+    trajectory, links = run.trajectory, run.trajectory.links
+    places = np.stack([trajectory.x_m, trajectory.y_m], axis=2)
+    lines = places[links[:, :1], links[:, 1:3]]
+    opacity = PACKET_OPACITY * min(1.0, math.sqrt(FEW_PACKETS / max(1, len(links))))
+    axes.add_collection(LineCollection(list(lines), colors=PACKET, linewidths=0.8, alpha=opacity))
+
+
+def _draw_robots(axes: Axes, run: RunData) -> None:
     trajectory, robots = run.trajectory, run.world.robots
-    colours = colormaps["plasma"](np.linspace(0.0, 0.84, len(robots)))
+    colours = robot_colours(len(robots))
     ends = np.minimum(crash_ticks(trajectory), trajectory.t_s.size - 1)
     goals = np.array([robot.goal for robot in robots])
     axes.scatter(goals[:, 0], goals[:, 1], s=70, facecolor="none", edgecolor=colours, lw=1.4)
@@ -151,6 +170,8 @@ def _draw_words(axes: Axes, figure: Any, run: RunData) -> None:
     axes.set_title(headline(run), loc="left", fontsize=12, color=INK, pad=10, fontweight="bold")
     entries = [("start", "o", 5, FAINT, FAINT), ("goal", "o", 8, "none", FAINT)]
     entries.append(("side chosen", "D", 5, "white", FAINT))
+    if len(run.trajectory.links):
+        entries.append(("features sent", "_", 9, PACKET, PACKET))
     if np.any(run.trajectory.collided):
         entries.append(("collision", "X", 8, CRASH, "white"))
     handles = [

@@ -44,6 +44,8 @@ _TYPES = {
     "scan_u8": "u1",
     "safe_bits": "u1",
     "links": "<i4",
+    "choices": "<f4",
+    "opinions": "<f4",
     "arrival_s": "<f4",
     "collided": "u1",
 }

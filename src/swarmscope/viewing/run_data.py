@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -13,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from swarmscope.errors import InputFileError
+from swarmscope.errors import InputFileError, SwarmscopeError
 from swarmscope.judging.cases import CHOICE_COLUMNS, OPINION_COLUMNS
 from swarmscope.judging.run_folder import TRAJECTORY, WORLD, read_metrics, read_trajectory, read_world
 from swarmscope.sim.world import Grid, Length, Number, Obstacle, Point, grid_corners, solid_from_grid
@@ -171,16 +172,28 @@ def crash_ticks(trajectory: Trajectory) -> Array:
 
 def replace_file(path: Path, content: bytes) -> Path:
     """Write ``content`` under a temporary name, then rename it to ``path``: no reader meets half a file."""
+    with replacing(path) as temporary:
+        temporary.write_bytes(content)
+    return path
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Give the body a temporary name to write to; what is there afterwards is synced and renamed to ``path``.
+
+    A SwarmscopeError says why it cannot be written.
+    """
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
-        with temporary.open("wb") as file:
-            file.write(content)
-            file.flush()
+        yield temporary
+        with temporary.open("rb") as file:
             os.fsync(file.fileno())
         temporary.replace(path)
+    except OSError as error:
+        raise SwarmscopeError(f"{path}: cannot be written: {error.strerror or error}") from error
     finally:
-        temporary.unlink(missing_ok=True)
-    return path
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
 
 
 def _checked_world(path: Path, content: Mapping[str, Any]) -> WorldFile:
@@ -242,7 +255,20 @@ def _value_fault(trajectory: Trajectory, robots: int) -> str:
     limits = np.array([trajectory.t_s.size, robots, robots])
     if np.any(trajectory.links[:, :3] < 0) or np.any(trajectory.links[:, :3] >= limits):
         return "links names a tick or a robot that does not exist"
+    return _choice_fault(trajectory, robots)
+
+
+def _choice_fault(trajectory: Trajectory, robots: int) -> str:
+    choices, opinions = trajectory.choices, trajectory.opinions
+    if not _are_indices(choices[:, :2], np.array([trajectory.t_s.size, robots])):
+        return "choices names a tick or a robot that does not exist"
+    if not _are_indices(opinions[:, :2], np.array([len(choices), np.inf])):  # neighbours may be strangers
+        return "opinions names a choice that does not exist, or no address"
     return ""
+
+
+def _are_indices(values: Array, limits: Array) -> bool:
+    return bool(np.all((values >= 0) & (values < limits) & (values == np.floor(values))))
 
 
 _KEY_FIGURES: tuple[tuple[str, str, str], ...] = (

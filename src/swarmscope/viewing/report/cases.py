@@ -11,7 +11,7 @@ from swarmscope.experiments.results import Run
 from swarmscope.onboard.body import protection_model
 from swarmscope.scenarios.read import parse_scenario
 from swarmscope.scenarios.to_kernels import body_of
-from swarmscope.viewing.pictures import FAINT, INK
+from swarmscope.viewing.colours import FAINT, INK
 from swarmscope.viewing.report import words
 from swarmscope.viewing.report.again import Again, Played
 from swarmscope.viewing.report.blocks import Block, Line, Picture, Row, Table, Text, cell

@@ -10,7 +10,8 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from swarmscope.sim.world import Obstacle
-from swarmscope.viewing.pictures import CRASH, FAINT, GROUND, INK, SOLID, SOLID_EDGE, _draw_obstacles
+from swarmscope.viewing.colours import CRASH, FAINT, GROUND, INK, SOLID, SOLID_EDGE
+from swarmscope.viewing.pictures import draw_obstacles
 from swarmscope.viewing.report.blocks import Picture, Table
 
 if TYPE_CHECKING:
@@ -105,7 +106,7 @@ def data_uri(svg: str) -> str:
 
 def draw_world(axes: Axes, obstacles: list[Obstacle]) -> None:
     """Draw obstacles; the many rectangles of an occupancy grid become one image within the drawing."""
-    _draw_obstacles(axes, obstacles)
+    draw_obstacles(axes, obstacles)
     for collection in axes.collections:
         if len(collection.get_paths()) > MANY_SHAPES:
             collection.set_rasterized(True)

@@ -16,7 +16,7 @@ from swarmscope.onboard.planners import load_planner
 from swarmscope.scenarios.scenario import RobotModel
 from swarmscope.scenarios.to_kernels import body_of
 from swarmscope.user_files import is_file_name
-from swarmscope.viewing.pictures import FAINT, INK
+from swarmscope.viewing.colours import FAINT, INK
 from swarmscope.viewing.report import words
 from swarmscope.viewing.report.blocks import Picture
 from swarmscope.viewing.report.drawing import PAPER, new_figure, note_grid, picture, symbols

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from swarmscope.experiments.results import Run
-from swarmscope.viewing.pictures import CRASH, FAINT
+from swarmscope.viewing.colours import CRASH, FAINT
 from swarmscope.viewing.report import words
 from swarmscope.viewing.report.again import Again, Played
 from swarmscope.viewing.report.blocks import Picture

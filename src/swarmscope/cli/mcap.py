@@ -1,0 +1,23 @@
+"""``swarmscope mcap``."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from swarmscope.cli._code import announce, files_of, refuse_code
+from swarmscope.experiments.warm_up import kernels_are_cold
+from swarmscope.viewing.bag.make import check_packages, make_mcap, scenario_of
+
+
+def mcap_command(run_dir: Path, out: Path | None, threads: int, code: bool) -> None:
+    """Play the run again and write its MCAP file."""
+    check_packages()
+    scenario = scenario_of(run_dir)
+    files = files_of([scenario])
+    if not code:
+        refuse_code(files)
+    announce(files)
+    if kernels_are_cold(scenario.planner.name):
+        print("compiling the kernels for the first time (about 40 s, kept on disk) ...", file=sys.stderr)
+    print(make_mcap(run_dir, scenario, out, threads))

@@ -1,0 +1,1 @@
+"""A run as a video, GIF or MP4."""
