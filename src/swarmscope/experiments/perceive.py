@@ -14,8 +14,9 @@ import numpy as np
 from swarmscope._jit import jit
 from swarmscope.errors import ConfigError, InputFileError
 from swarmscope.onboard.body import Body
-from swarmscope.onboard.lidar import LONGEST_M, Layout, Rays, grid_of, lay_out, same_rays
+from swarmscope.onboard.lidar import LONGEST_M, Layout, grid_of, lay_out, same_rays
 from swarmscope.onboard.perception.mend import mend
+from swarmscope.onboard.perception.rays import Rays
 from swarmscope.onboard.perception.reproject import Grid, Seat, reproject, settle
 from swarmscope.onboard.perception.safety import safe_directions
 from swarmscope.onboard.rig import AHEAD, Rig, make_rig
