@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from command_line import refused, swarmscope
 
-from swarmscope.experiments.perceive import Use, perceive
+from swarmscope.experiments.lay_out_scans import Use
+from swarmscope.experiments.perceive import perceive
 from swarmscope.sim.scan_files import load_scans
 
 STEP = 2.0 * math.pi / 360
@@ -38,10 +39,10 @@ def test_zeros_block_unless_they_mean_no_return(tmp_path):
     scan = np.where(np.isinf(with_wall()), 0.0, with_wall())
     file = written(tmp_path, scan)
     seen = perceive(load_scans(file))
-    assert (seen.safe.sum(), seen.below.tolist()) == (0, [340])
-    assert safe_in(file, no_return=0.0) == safe_in(written(tmp_path, with_wall(), name="inf.csv"))
+    assert (seen.safe.sum(), seen.counts.below.tolist()) == (0, [340])
+    assert safe_in(file, no_return=[0.0]) == safe_in(written(tmp_path, with_wall(), name="inf.csv"))
     said = swarmscope("perceive", file).stdout
-    assert "340.0 of 360" in said and "--no-return 0" in said
+    assert "340 of 360: 340 block" in said and "--no-return 0" in said
     assert "below" not in swarmscope("perceive", file, "--no-return", 0).stdout
 
 
@@ -51,7 +52,7 @@ def test_what_is_safe_without_broken_beams_is_safe_with_them(tmp_path, bad, brok
     scan = OPEN.copy()
     scan[broken] = bad
     seen = perceive(load_scans(written(tmp_path, scan)))
-    assert (seen.safe.sum(), seen.broken.tolist(), seen.below.tolist()) == (360, [len(broken)], [0])
+    assert (seen.safe.sum(), seen.counts.broken.tolist(), seen.counts.below.tolist()) == (360, [len(broken)], [0])
 
 
 def test_beams_may_run_clockwise_or_hang_upside_down(tmp_path):
@@ -77,7 +78,7 @@ def test_circles_are_closed_however_they_are_spelled(tmp_path, beams, turn):
 def test_scans_may_differ_by_a_beam(tmp_path):
     file = written(tmp_path, np.full(456, 3.0), np.full(455, 3.0), first=0.0, step=0.013808)
     seen = perceive(load_scans(file), Use(range_m=3.5))
-    assert seen.safe.all() and not seen.broken.any()
+    assert seen.safe.all() and not seen.counts.broken.any()
 
 
 def test_posts_of_the_robot_itself_can_be_masked(tmp_path):
@@ -88,9 +89,9 @@ def test_posts_of_the_robot_itself_can_be_masked(tmp_path):
     assert safe_in(file) == [0]
     masks = [(at - 1.5, at + 1.5) for at in (-135, -45, 45, 135)]
     seen = perceive(load_scans(file), Use(masks_deg=masks))
-    assert (seen.safe.sum(), seen.masked) == (360, 12)
+    assert (seen.safe.sum(), seen.counts.own.tolist()) == (360, [12])
     words = [word for first, last in masks for word in ("--mask", f"{first}..{last}")]
-    assert "12, bridged" in swarmscope("perceive", file, *words).stdout
+    assert "12 of 360: 12 bridged" in swarmscope("perceive", file, *words).stdout
     across = np.full(360, np.inf)
     across[[0, 359]] = 0.1
     assert safe_in(written(tmp_path, across, name="back.csv"), masks_deg=[(178.0, -178.0)]) == [360]

@@ -10,7 +10,9 @@ import pytest
 
 from helpers import circles_world, one_robot, rig_of, scan_at
 from swarmscope.errors import ConfigError, InputFileError
-from swarmscope.experiments.perceive import Use, perceive, write_features
+from swarmscope.experiments.lay_out_scans import Use
+from swarmscope.experiments.perceive import perceive, write_features
+from swarmscope.onboard.body import Body
 from swarmscope.onboard.perception.safety import safe_directions
 from swarmscope.onboard.rig import AHEAD
 from swarmscope.onboard.tick import own_features
@@ -109,7 +111,7 @@ def test_single_broken_readings_close_no_direction_and_are_counted(beams, walls_
     torn[list(beams)] = np.nan
     seen = perceive(log_of(np.stack([whole, torn])))
     assert seen.safe.all()
-    assert seen.broken.tolist() == [0, len(beams)]
+    assert seen.counts.broken.tolist() == [0, len(beams)]
     assert len(seen.features[1]) == len(seen.features[0])
 
 
@@ -118,7 +120,7 @@ def test_a_hole_in_which_a_body_fits_closes_its_directions():
     torn[120:240] = np.nan
     seen = perceive(log_of(torn))
     assert not seen.safe[0, 120:240].any() and seen.safe[0, :25].all()
-    assert seen.broken.tolist() == [120]
+    assert seen.counts.broken.tolist() == [120]
 
 
 def test_the_log_itself_is_not_changed(forest_scans):
@@ -146,8 +148,8 @@ def _finite(values):
         ({"range_m": 0.0}, "--range"),
         ({"range_m": math.nan}, "--range"),
         ({"range_m": math.inf}, "--range"),
-        ({"radius_m": 0.0}, "radius"),
-        ({"radius_m": math.nan}, "radius"),
+        ({"body": Body(radius_m=0.0)}, "radius"),
+        ({"body": Body(radius_m=math.nan)}, "radius"),
         ({"beam_step": 0}, "--beam-step"),
         ({"beam_step": 500}, "two beams"),
     ],

@@ -74,7 +74,7 @@ def test_metres_layout(tmp_path: Path) -> None:
 
 def test_rep_117_minus_infinity_is_too_close(tmp_path: Path) -> None:
     log = load_scans(_npz(tmp_path / "a.npz", ranges_m=np.array([[-np.inf, 1.0]])))
-    assert log.ranges_m.tolist() == [[0.0, 1.0]]
+    assert log.ranges_m.tolist() == [[-np.inf, 1.0]]
 
 
 @pytest.mark.parametrize("suffix", [".npz", ".csv"])
@@ -89,8 +89,9 @@ def test_missing_empty_folder(tmp_path: Path, suffix: str) -> None:
 
 
 def test_unknown_kind_of_file(tmp_path: Path) -> None:
-    (tmp_path / "a.bag").write_bytes(b"x")
-    _refused(tmp_path / "a.bag", r"\.npz, \.csv")
+    for name, words in (("a.pcd", r"\.npz, \.csv"), ("a.csv.gz", "unpack it first"), ("a.xlsx", "save it as CSV")):
+        (tmp_path / name).write_bytes(b"x")
+        _refused(tmp_path / name, words)
 
 
 @pytest.mark.parametrize(

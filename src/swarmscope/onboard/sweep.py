@@ -51,6 +51,12 @@ def bridged(scan: np.ndarray, layout: Layout, rig: Rig) -> np.ndarray:
     holes = np.isnan(scan)
     if not holes.any():
         return scan
+    whole = mended(scan, layout, rig)
+    return np.where(holes & is_bridged(whole, rig), whole, scan)
+
+
+def mended(scan: np.ndarray, layout: Layout, rig: Rig) -> np.ndarray:
+    """Return ``scan (M,)`` along the rays of ``layout`` as ``mend`` leaves it."""
     rays, sensor = layout.rays, rig.sensor
     whole, broken = scan.copy(), np.empty(scan.size, np.uint8)
     told = Sensor(
@@ -64,8 +70,12 @@ def bridged(scan: np.ndarray, layout: Layout, rig: Rig) -> np.ndarray:
         position_sigma=sensor.position_sigma,
     )
     mend(whole, rig._replace(sensor=told), broken)
-    narrow = whole > np.float32(BRIDGED * body_and_clearance(rig))
-    return np.where(holes & narrow, whole, scan)
+    return whole
+
+
+def is_bridged(whole: np.ndarray, rig: Rig) -> np.ndarray:
+    """Return which holes (M,) were bridged, and do not block."""
+    return np.asarray(whole > np.float32(BRIDGED * body_and_clearance(rig)))
 
 
 def _core(rig: Rig) -> float:

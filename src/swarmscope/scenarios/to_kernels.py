@@ -51,7 +51,7 @@ def complete(scenario: Scenario, run_files: bool = True) -> dict[str, Any]:
 def make_rig_of(scenario: Scenario) -> Rig:
     """Return what the scenario's robots know of themselves."""
     beams = make_beams(scenario.lidar.beams, math.radians(scenario.lidar.fov_deg), scenario.lidar.range_m)
-    robot, noise = scenario.robot, scenario.noise
+    range_sigma, position_sigma = sigmas_of(scenario)
     sensor = Sensor(
         beams=scenario.lidar.beams,
         angle_min=beams.angle_min,
@@ -59,14 +59,23 @@ def make_rig_of(scenario: Scenario) -> Rig:
         wraps=beams.wraps,
         range_min=scenario.lidar.range_min_m,
         range_max=scenario.lidar.range_m,
-        range_sigma=noise.range_fraction,
-        position_sigma=math.hypot(noise.range_fraction, math.radians(noise.bearing_deg)),
+        range_sigma=range_sigma,
+        position_sigma=position_sigma,
     )
-    body = Body(**robot.model_dump())
-    guard, safety = scenario.guard, scenario.safety
-    return _latest_rig(
-        body,
-        all_round(sensor),
+    return _latest_rig(all_round(sensor), *sheet_of(scenario))
+
+
+def sigmas_of(scenario: Scenario) -> tuple[float, float]:
+    """Return the standard deviations of a range and of a neighbour's position, as fractions of the distance."""
+    noise = scenario.noise
+    return noise.range_fraction, math.hypot(noise.range_fraction, math.radians(noise.bearing_deg))
+
+
+def sheet_of(scenario: Scenario) -> tuple[Body, Guarding, Safety, Sharing]:
+    """Return the data sheet of the scenario's robots but the LiDAR."""
+    guard, safety, noise = scenario.guard, scenario.safety, scenario.noise
+    return (
+        Body(**scenario.robot.model_dump()),
         Guarding(
             **guard.model_dump(exclude_none=True),
             latency_s=noise.scan_age_s,
@@ -80,7 +89,7 @@ def make_rig_of(scenario: Scenario) -> Rig:
 
 
 @lru_cache(maxsize=1)
-def _latest_rig(body: Body, sensor: Sensor, guarding: Guarding, safety: Safety, sharing: Sharing) -> Rig:
+def _latest_rig(sensor: Sensor, body: Body, guarding: Guarding, safety: Safety, sharing: Sharing) -> Rig:
     """Return the rig of this data sheet; that of the last one asked for, whose tables take long, is kept."""
     return make_rig(body, sensor, guarding, safety, sharing)
 
