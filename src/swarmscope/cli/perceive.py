@@ -33,6 +33,8 @@ def perceive_command(scans: str, out: Path | None, ask: Ask, use: Use) -> None:
     _print_table(log, seen)
     if seen.counts.below_blocks.any():
         print("readings below range_min block; where zeros mean that there was no return: --no-return 0")
+    if seen.counts.inside.any():
+        print("returns from within the robot block; where it sees its own posts: --mask FROM..TO")
     if out is not None:
         for path in write_results(out, seen, log.name):
             print(path)
@@ -131,6 +133,9 @@ def _counted(log: ScanLog, seen: Perception) -> list[tuple[str, str]]:
     ):
         if found.any():
             rows.append((name, _done(found, blocks, beams)))
+    if counts.inside.any():
+        words = f"{_few(counts.inside.mean())} of {beams}"
+        rows.append((f"within the robot's radius ({seen.rig.body.radius_m:g} m)", words))
     if counts.moved:
         rows.append(("put right for the robot's own motion", f"{counts.moved}"))
     elif log.time_increment != 0.0:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -53,7 +54,7 @@ class Use(NamedTuple):
 
 @dataclass(frozen=True)
 class Counts:
-    """What became of the readings of K scans; all (K,) whole numbers of readings but the last two."""
+    """What became of the readings of K scans; all (K,) whole numbers of readings but the last two fields."""
 
     open: np.ndarray
     """There was no return within the range."""
@@ -67,13 +68,15 @@ class Counts:
     own: np.ndarray
     """In which the robot sees itself."""
     own_blocks: np.ndarray
+    inside: np.ndarray
+    """Sound returns from within the robot's radius: of itself, or of what it touches."""
     moved: int
     """Scans put right for the robot's own motion."""
     turned: int
     """Scans whose readings lay along other rays than most."""
 
 
-COUNTED = ("open", "broken", "broken_blocks", "below", "below_blocks", "own", "own_blocks")
+COUNTED = ("open", "broken", "broken_blocks", "below", "below_blocks", "own", "own_blocks", "inside")
 
 
 class _Key(NamedTuple):
@@ -86,9 +89,12 @@ class _Key(NamedTuple):
 
 def layout_of(log: ScanLog, use: Use) -> Layout:
     """Return the layout that most scans have, counter-clockwise, a circle closed where it closes."""
-    keys = _keys(log)
-    counts = {key: keys.count(key) for key in dict.fromkeys(keys)}
-    return _layout(log, use, max(counts, key=lambda key: (counts[key], key.readings)))
+    return _layout(log, use, _commonest(_keys(log)))
+
+
+def _commonest(keys: list[_Key]) -> _Key:
+    counts = Counter(keys)
+    return max(counts, key=lambda key: (counts[key], key.readings))
 
 
 def lay_out_scans(log: ScanLog, use: Use, rig: Rig) -> tuple[np.ndarray, Counts]:
@@ -115,7 +121,7 @@ def lay_out_scans(log: ScanLog, use: Use, rig: Rig) -> tuple[np.ndarray, Counts]
             scans[k] = raw
         else:
             scans[k] = from_one_place(raw, layout, HERE, CENTRED, rig, wanted)
-    turned = sum(not same_rays(ways[key].layout, whole) for key in keys)
+    turned = len(keys) - keys.count(_commonest(keys))
     found = dict(zip(COUNTED, counted.T, strict=True))
     return scans, Counts(**found, moved=0 if was_at is None else len(keys), turned=turned)
 
@@ -126,7 +132,8 @@ def _counted(values: np.ndarray, raw: np.ndarray, own: np.ndarray, layout: Layou
     blocks = holes & ~is_bridged(mended(raw, layout, rig), rig)
     near = holes & ~own & ((values >= 0.0) | (values == -np.inf))
     broken = holes & ~own & ~near
-    parts = (broken, broken & blocks, near, near & blocks, own, own & blocks)
+    inside = ~holes & (raw < rig.body.radius_m)
+    parts = (broken, broken & blocks, near, near & blocks, own, own & blocks, inside)
     return int(np.isinf(raw).sum()), *(int(part.sum()) for part in parts)
 
 

@@ -17,7 +17,7 @@ from swarmscope.onboard.perception.mend import mend
 from swarmscope.onboard.perception.safety import safe_directions
 from swarmscope.onboard.rig import AHEAD, Rig, make_rig
 from swarmscope.onboard.sensor import Sensor
-from swarmscope.onboard.sharing.message import MAX_FEATURES_BYTES, Head, encode_exact_features, encode_features
+from swarmscope.onboard.sharing.message import MAX_PACKET_BYTES, Head, encode_exact_features, encode_features
 from swarmscope.onboard.tick import own_features
 from swarmscope.onboard.view import Swarm, new_swarm, view_of
 from swarmscope.sim.scan_files import ScanLog
@@ -91,7 +91,7 @@ def _check(log: ScanLog, use: Use) -> None:
 
 def _message_bytes(angles: np.ndarray, distances: np.ndarray, rig: Rig) -> int:
     """Return the bytes of the message with these features."""
-    head, packet, count = Head(0, 0, 0, 0), np.zeros(MAX_FEATURES_BYTES, np.uint8), len(angles)
+    head, packet, count = Head(0, 0, 0, 0), np.zeros(MAX_PACKET_BYTES, np.uint8), len(angles)
     if rig.sharing.exact_features:
         return int(encode_exact_features(head, angles, distances, count, packet))
     return int(encode_features(head, angles, distances, count, rig.sensor.range_max, packet))

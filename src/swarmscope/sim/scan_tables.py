@@ -169,11 +169,11 @@ def _from_echo(text: str, every: int) -> Arrays:
         fits = math.isfinite(first) and math.isfinite(last) and math.isfinite(step) and step != 0.0
         count = round((last - first) / step) + 1 if fits else 0
         left = len(words) - ECHO_FIELDS
-        count = next((n for n in (left, left // 2) if abs(n - count) <= 1), 0)
+        count = next((n for n in (left, left / 2) if n == int(n) and abs(n - count) <= 1), 0)
         if count < 1:
             angles = f"angle {first:g} to {last:g} in steps of {step:g}"
             raise BadFile(f"line {number}: {left} readings do not go from {angles}")
-        rows.append(np.array([number_in(word, number) for word in words[ECHO_FIELDS : ECHO_FIELDS + count]]))
+        rows.append(np.array([number_in(word, number) for word in words[ECHO_FIELDS : ECHO_FIELDS + int(count)]]))
         heads.append([first, step, least, most, between])
         stamps.append(sec + NANOSECONDS * nanosec)
     return _heads(list(USED_KEYS), heads) | padded(rows) | as_stamps(stamps)
