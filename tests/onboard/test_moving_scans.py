@@ -143,7 +143,9 @@ def test_a_robot_that_stands_sees_its_scan_as_it_is():
     assert driver.robot.rows.scan.tobytes() == scan.tobytes()
 
 
-@pytest.mark.parametrize(("value", "words"), [(0.1, "35.9 s"), (math.inf, "finite"), ("1", "finite")])
+@pytest.mark.parametrize(
+    ("value", "words"), [(0.1, "35.9 s"), (0.002, "it may take 0.4 s"), (math.inf, "finite"), ("1", "finite")]
+)
 def test_impossible_times_are_refused(value, words):
     with pytest.raises(ConfigError, match=words):
         Robot("nav-scope", FAST, Lidar(time_increment_s=value), address=1)

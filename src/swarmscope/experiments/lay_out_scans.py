@@ -129,7 +129,7 @@ def lay_out_scans(log: ScanLog, use: Use, rig: Rig) -> tuple[np.ndarray, Counts]
 def _counted(values: np.ndarray, raw: np.ndarray, own: np.ndarray, layout: Layout, rig: Rig) -> tuple[int, ...]:
     """Return the fields of `Counts` of one scan: ``values (M,)`` as they were, ``raw (M,)`` as they are understood."""
     holes = ~(raw >= least_range(rig))
-    blocks = holes & ~is_bridged(mended(raw, layout, rig), rig)
+    blocks = holes & ~is_bridged(mended(raw, layout, rig), rig) if holes.any() else holes
     near = holes & ~own & ((values >= 0.0) | (values == -np.inf))
     broken = holes & ~own & ~near
     inside = ~holes & (raw < rig.body.radius_m)

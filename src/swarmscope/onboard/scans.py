@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from swarmscope.errors import ConfigError
 from swarmscope.geometry import Pose
 from swarmscope.onboard.edge import Unusable, number, readings, short
 from swarmscope.onboard.lidar import Layout, Lidar, grid_of, lay_out, layout_of, same_rays, seen_from_above, sweep_s
@@ -24,6 +25,8 @@ STALE_PERIODS = 3.05
 """Older scans are not used: three periods, and a little for rounding."""
 AHEAD_PERIODS = 0.5
 """A scan may be stamped this much later than the tick."""
+LONGEST_PERIODS = 2.0
+"""A scan takes no longer: it would be too old before the next one comes."""
 LONGER_PERIODS = 0.1
 """By so much may a message say that a scan takes longer than the data sheet says."""
 
@@ -50,6 +53,9 @@ class Scans:
 
     def __init__(self, lidar: Lidar, period_s: float) -> None:
         self._lidar, self._period_s = lidar, period_s
+        if sweep_s(lidar) > LONGEST_PERIODS * period_s:
+            takes, used = f"{sweep_s(lidar):.3g}", f"{LONGEST_PERIODS * period_s:.3g}"
+            raise ConfigError("lidar.time_increment_s", f"a scan takes {takes} s; at this rate_hz it may take {used} s")
         self._sheet = layout_of(lidar)
         self.grid = grid_of(self._sheet)
         angles = self.grid.rays.start + self.grid.rays.increment * np.arange(self.grid.order.size)

@@ -46,8 +46,9 @@ def padded(rows: list[npt.NDArray[Any]]) -> Arrays:
     filled = np.full((len(rows), int(lengths.max(initial=0))), np.nan)
     if filled.size > MOST_READINGS:
         raise BadFile(f"holds {filled.size} readings; at most {MOST_READINGS} are read (--every 10: every tenth scan)")
-    for k, row in enumerate(rows):
-        filled[k, : len(row)] = row
+    with np.errstate(invalid="ignore"):  # NaN of all kinds
+        for k, row in enumerate(rows):
+            filled[k, : len(row)] = row
     return {"ranges_m": filled, "lengths": lengths}
 
 

@@ -169,11 +169,11 @@ def _from_echo(text: str, every: int) -> Arrays:
         fits = math.isfinite(first) and math.isfinite(last) and math.isfinite(step) and step != 0.0
         count = round((last - first) / step) + 1 if fits else 0
         left = len(words) - ECHO_FIELDS
-        count = next((n for n in (left, left / 2) if n == int(n) and abs(n - count) <= 1), 0)
+        count = next((n for n in (left, left // 2) if n > 0 and left % n == 0 and abs(n - count) <= 1), 0)
         if count < 1:
             angles = f"angle {first:g} to {last:g} in steps of {step:g}"
             raise BadFile(f"line {number}: {left} readings do not go from {angles}")
-        rows.append(np.array([number_in(word, number) for word in words[ECHO_FIELDS : ECHO_FIELDS + int(count)]]))
+        rows.append(np.array([number_in(word, number) for word in words[ECHO_FIELDS : ECHO_FIELDS + count]]))
         heads.append([first, step, least, most, between])
         stamps.append(sec + NANOSECONDS * nanosec)
     return _heads(list(USED_KEYS), heads) | padded(rows) | as_stamps(stamps)
@@ -227,7 +227,8 @@ def _robotlaser(words: list[str], line: int) -> tuple[list[float], list[float], 
     start, _, step, longest = (number_in(word, line) for word in words[2:6])
     readings, _ = _counted(words, 8, 1, line)
     at = 9 + len(readings)
-    rest = words[at + 1 + int(number_in(words[at], line)) :]
+    remissions = number_in(words[at], line)
+    rest = words[at + 1 + int(remissions) :] if 0.0 <= remissions < len(words) else []
     if len(rest) < 12:
         raise BadFile(f"line {line}: torn: it ends after {len(words)} words")
     numbers = [number_in(word, line) for word in rest[:12]]
@@ -238,7 +239,7 @@ def _robotlaser(words: list[str], line: int) -> tuple[list[float], list[float], 
 def _counted(words: list[str], at: int, more: int, line: int) -> tuple[list[float], list[float]]:
     """Return as many readings as word ``at`` says, and ``more`` numbers after them."""
     count = number_in(words[at], line) if len(words) > at else 0.0
-    stop = at + 1 + int(count) if count < len(words) else len(words) + 1
+    stop = at + 1 + int(count) if 0.0 <= count < len(words) else len(words) + 1
     if stop + more > len(words):
         raise BadFile(f"line {line}: torn: it ends after {len(words)} words")
     return (
