@@ -160,6 +160,12 @@ def test_impossible_options_are_refused(options, words, forest_scans):
         perceive(log_of(forest_scans), Use(**options))
 
 
+def test_more_readings_than_a_robot_uses_are_refused():
+    with pytest.raises(ConfigError, match="--beam-step"):
+        perceive(log_of(np.full(9000, 3.0)))
+    assert perceive(log_of(np.full(9000, 3.0)), Use(beam_step=10)).safe.shape == (1, 900)
+
+
 def test_a_range_below_the_scanners_smallest_is_refused(forest_scans):
     with pytest.raises(ConfigError, match="smallest range"):
         perceive(log_of(forest_scans, range_min=0.5), Use(range_m=0.4))

@@ -166,6 +166,7 @@ def test_archive_that_claims_too_much(tmp_path: Path, monkeypatch: pytest.Monkey
         ({"angle_min": np.ones(2)}, "one finite number"),
         ({"angle_min": "east"}, "one finite number"),
         ({"angle_increment": 0.0}, "angle_increment is 0"),
+        ({"angle_increment": 1e-300}, "too close together"),
         ({"angle_increment": 4000.0}, "more than one turn"),
         ({"angle_increment": -4000.0}, "more than one turn"),
         ({"range_max": 0.1}, "0 <= min < max"),

@@ -16,6 +16,7 @@ from swarmscope.onboard.lidar import LONGEST_M, Layout, grid_of
 from swarmscope.onboard.perception.mend import mend
 from swarmscope.onboard.perception.safety import safe_directions
 from swarmscope.onboard.rig import AHEAD, Rig, make_rig
+from swarmscope.onboard.scans import MOST_READINGS
 from swarmscope.onboard.sensor import Sensor
 from swarmscope.onboard.sharing.message import MAX_PACKET_BYTES, Head, encode_exact_features, encode_features
 from swarmscope.onboard.tick import own_features
@@ -82,8 +83,11 @@ def _check(log: ScanLog, use: Use) -> None:
     least = max(log.range_min, use.range_min_m)
     if not use.range_m > least:
         raise ConfigError("--range", f"must be above the scanner's smallest range, {least:g} m")
-    if log.ranges_m[:, :: use.beam_step].shape[1] < 2:
+    used = log.ranges_m[:, :: use.beam_step].shape[1]
+    if used < 2:
         raise ConfigError(log.name, "a scan needs at least two beams")
+    if used > MOST_READINGS:
+        raise ConfigError("--beam-step", f"a robot uses at most {MOST_READINGS} of a scan's readings, not {used}")
     for name, value in (("--time-increment", use.time_increment_s), ("--speed, --turn-rate", use.motion)):
         if value is not None and not np.isfinite(value).all():
             raise ConfigError(name, "must be a finite number")

@@ -45,6 +45,8 @@ UNITS = {"ranges_m": 1.0, "ranges_cm": 100.0, "ranges_mm": 1000.0}
 PER_SCAN = (*UNITS, "stamp_s", "odom_xy_yaw")
 FARTHEST_M = 100.0
 """Hardly a 2D LiDAR sees farther."""
+FINEST_RAD = 1e-4
+"""Readings are farther apart: half a turn has so many places in tables of int16."""
 MOST_TURNS = 100.0
 """No direction is larger [rad]."""
 NO_HEADER = "say it with --fov DEGREES, or in a line '# angle_min=.. angle_increment=.. range_min=.. range_max=..'"
@@ -248,6 +250,8 @@ def in_radians(geometry: npt.NDArray[np.float64], beams: int) -> tuple[npt.NDArr
 def _check_rays(first: float, step: float, beams: int) -> None:
     if step == 0.0:
         raise BadFile("angle_increment is 0")
+    if abs(step) < FINEST_RAD:
+        raise BadFile(f"angle_increment {step:g}: readings lie too close together")
     if (beams - 1) * abs(step) > LARGEST_FIELD:
         raise BadFile(f"{beams} beams of {step:g} rad are more than one turn")
     if abs(first) > MOST_TURNS:
