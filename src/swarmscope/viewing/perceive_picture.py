@@ -13,6 +13,8 @@ from swarmscope.viewing.pictures import FAINT, GROUND, INK
 if TYPE_CHECKING:
     from swarmscope.experiments.perceive import Perception
 
+Extent = tuple[float, float, float, float]
+
 PANELS = 6
 SHAPES = {1: (1, 1), 2: (1, 2), 3: (1, 3), 4: (2, 2), 5: (2, 3), 6: (2, 3)}
 SAFE, FILTERED, FEATURE = "#2a9d57", "#3a6ea5", "#d1495b"
@@ -33,7 +35,7 @@ def write_perceive_picture(path: Path, seen: Perception, title: str) -> Path:
         mpl.rcdefaults()
         chosen = _choose(seen)
         rows, columns = SHAPES[len(chosen)]
-        left, right, bottom, top = _extent(seen)
+        left, right, bottom, top = extent = _extent(seen, chosen)
         wide = PANEL_IN * (right - left) / (top - bottom) if right - left < top - bottom else PANEL_IN
         size = (max(6.2, columns * (wide + 0.25)), rows * (PANEL_IN + 0.35) + 1.15)
         figure = Figure(figsize=size, dpi=130, facecolor="white", layout="constrained")
@@ -42,7 +44,7 @@ def write_perceive_picture(path: Path, seen: Perception, title: str) -> Path:
         for panel in axes.ravel()[len(chosen) :]:
             panel.set_axis_off()
         for panel, k in zip(axes.ravel(), chosen, strict=False):
-            _draw_frame(panel, seen)
+            _draw_frame(panel, seen, extent)
             _draw_scan(panel, seen, k)
         handles, labels = axes.ravel()[0].get_legend_handles_labels()
         figure.legend(
@@ -71,17 +73,19 @@ def _choose(seen: Perception) -> list[int]:
     return [int(part[np.argmax(worth[part])]) for part in parts]
 
 
-def _extent(seen: Perception) -> tuple[float, float, float, float]:
-    """Return left, right, bottom, top [m] of what a scan can show."""
-    limit = 1.06 * seen.rig.sensor.range_max
+def _extent(seen: Perception, chosen: list[int]) -> Extent:
+    """Return left, right, bottom, top [m] round what these scans show, at most the LiDAR's range."""
+    ranges = seen.ranges_m[chosen]
+    shown = (_ahead(seen), float(seen.filtered_m[chosen].max()), float(ranges[np.isfinite(ranges)].max(initial=0.0)))
+    limit = 1.06 * min(max(shown), seen.rig.sensor.range_max)
     return limit * min(-0.1, float(np.cos(seen.angles).min())), limit, -limit, limit
 
 
-def _draw_frame(panel: Any, seen: Perception) -> None:
+def _draw_frame(panel: Any, seen: Perception, extent: Extent) -> None:
     """Draw how far the LiDAR sees, the robot, and a scale."""
     from matplotlib.patches import Circle
 
-    left, right, bottom, top = _extent(seen)
+    left, right, bottom, top = extent
     panel.set_xlim(left, right)
     panel.set_ylim(bottom, top)
     panel.set_aspect("equal")
@@ -96,7 +100,7 @@ def _draw_frame(panel: Any, seen: Perception) -> None:
     panel.fill(x, y, facecolor="white", edgecolor="#d5d8da", lw=0.8, zorder=0)
     panel.add_patch(Circle((0.0, 0.0), radius, facecolor=INK, lw=0.0, zorder=5))
     panel.plot([0.0, 1.8 * radius], [0.0, 0.0], color=INK, lw=1.4, zorder=5, solid_capstyle="round")
-    _draw_scale(panel, right, bottom, sensor.range_max)
+    _draw_scale(panel, right, bottom, top)
 
 
 def _draw_scale(panel: Any, right: float, bottom: float, limit: float) -> None:
@@ -132,7 +136,7 @@ def _draw_fan(panel: Any, seen: Perception, k: int) -> None:
     """Fill the safe directions as far as they are kept free, and never as far as a return."""
     reach = fan_reach(seen, k)
     cos, sin = np.cos(seen.angles), np.sin(seen.angles)
-    free = f"safe directions (free for {_ahead(seen):.2g} m)"
+    free = f"safe directions, up to {_ahead(seen):.2g} m"
     edges = np.flatnonzero(np.diff(np.concatenate([[0], seen.safe[k].astype(int), [0]])))
     for first, last in edges.reshape(-1, 2):
         arc = np.arange(first, last)
