@@ -108,6 +108,9 @@ def test_separators_of_all_kinds(tmp_path, separator, end):
     file.write_bytes((lines[0] + "\r\n" + lines[1] + end + "\r\n").encode())
     log = load_scans(file)
     assert log.ranges_m.shape == (1, 181) and (log.ranges_m == 3.0).all()
+    if separator in (",", ";"):
+        file.write_text("\n".join((lines[0], separator.join(['"3.0"'] * 181) + end, "")))
+        assert (load_scans(file).ranges_m == 3.0).all()
 
 
 def test_degrees_and_millimetres_are_noticed(tmp_path):

@@ -7,7 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from robots import Driver, Header, LaserScan, brakes, new_robot
+from helpers import DT, rig_of, scan_at
+from robots import Driver, Header, LaserScan, brakes, forest, new_robot
 from swarmscope.errors import ConfigError
 from swarmscope.onboard.body import Body
 from swarmscope.onboard.lidar import Lidar
@@ -160,3 +161,36 @@ def test_between_stamps_a_robot_drove_an_arc():
     assert quarter[2] == pytest.approx([math.sin(0.5), 1.0 - math.cos(0.5), 3.5 - 2.0 * math.pi])
     assert quarter[4, :2] == pytest.approx([math.sin(1.0), 0.5 * (2.0 - math.cos(1.0))])
     assert quarter[[3, 5]] == pytest.approx(poses[1:])
+
+
+@pytest.mark.parametrize(("seed", "first_deg"), [(0, None), (2, 0.0)])
+def test_driving_with_a_lidar_that_turns_touches_nothing(seed, first_deg):
+    """At 1 m/s through the forest, the readings of each scan spread over the whole period between two ticks."""
+    world, rig, goal, parts = forest(seed), rig_of(), (4.2, 3.2), 12
+    robot = Robot("nav-scope", FAST, Lidar(first_deg=first_deg, time_increment_s=STEP_S), address=1)
+    robot.warm_up()
+    driver, (x, y, yaw, v), moved = Driver(robot), (0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    way, nearest = [(x, y, yaw)] * parts, math.inf
+    for _ in range(90):
+        scan = np.empty(BEAMS, np.float32)
+        for part, pose in zip(np.array_split(np.arange(BEAMS), parts), way, strict=True):
+            there = scan_at(world, rig, *pose)
+            scan[part] = there[part if first_deg is None else (part + 180) % 360]
+            nearest = min(nearest, there.min())
+        gx, gy = goal[0] - x, goal[1] - y
+        if math.hypot(gx, gy) < 0.3:
+            break
+        bearing = math.atan2(gy, gx) - yaw
+        command = driver.tick(
+            scan, scan_s=driver.now_s, goal=(bearing, math.hypot(gx, gy)), heading=yaw, speed=v, moved=moved
+        )
+        assert command.ok
+        x0, y0, yaw0, way = x, y, yaw, []
+        for _ in range(parts):
+            way.append((x, y, yaw))
+            v += max(-2.0 * DT / parts, min(2.0 * DT / parts, command.v - v))
+            yaw += command.w * DT / parts
+            x, y = x + v * DT / parts * math.cos(yaw), y + v * DT / parts * math.sin(yaw)
+        dx, dy, c, s = x - x0, y - y0, math.cos(yaw0), math.sin(yaw0)
+        moved = (c * dx + s * dy, c * dy - s * dx, yaw - yaw0)
+    assert nearest > 0.15 and math.hypot(goal[0] - x, goal[1] - y) < 0.3

@@ -170,7 +170,8 @@ def _time_increment(log: ScanLog, use: Use) -> float:
     step_s = log.time_increment if use.time_increment_s is None else use.time_increment_s
     sweep = abs(step_s) * (log.ranges_m.shape[1] - 1)
     if sweep > LONGEST_SWEEP_S:
-        raise ConfigError("--time-increment", f"a scan would take {sweep:.3g} s; at most {LONGEST_SWEEP_S:g} s")
+        why = f"a scan would take {sweep:.3g} s, at most {LONGEST_SWEEP_S:g} s (0: all at once)"
+        raise ConfigError("--time-increment", why)
     return step_s
 
 

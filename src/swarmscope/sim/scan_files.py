@@ -115,7 +115,7 @@ def load_scans(path: str | Path, ask: Ask = Ask()) -> ScanLog:  # noqa: B008  a 
 def _reader_of(path: Path) -> Callable[[Path, Ask], Read]:
     """Return what reads this kind of file; raises BadFile."""
     kind = path.suffix.lower()
-    readers = {".npz": _read_npz} | dict.fromkeys((".csv", ".txt", ".log", ".clf"), _read_table)
+    readers = {".npz": _read_npz} | dict.fromkeys((".csv", ".tsv", ".txt", ".log", ".clf"), _read_table)
     if is_bag(path):
         return read_bag
     if kind in readers:

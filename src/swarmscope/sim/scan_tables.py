@@ -65,7 +65,7 @@ def number_in(word: str, line: int) -> float:
 
 def _readings(row: str, line: int) -> npt.NDArray[Any]:
     """Return the readings of a line; a separator at its end adds none."""
-    row = row.rstrip(",; \t")
+    row = row.replace('"', "").rstrip(",; \t")
     words = row.split(";") if ";" in row else row.split(",") if "," in row else row.split()
     return np.array([number_in(word, line) for word in words])
 
