@@ -271,3 +271,11 @@ def test_the_whole_data_sheet_counts(forest_scans):
     assert (perceive(log, Use(range_min_m=2.0)).counts.below > 0).all()
     exact = perceive(log, Use(sharing=Sharing(exact_features=True)))
     assert exact.packet_bytes.min() > perceive(log).packet_bytes.max() > 20
+
+
+def test_half_a_circle_in_the_open_is_free_while_the_robot_drives():
+    log = replace(log_of(np.full((2, 181), np.inf), fov=math.pi), time_increment=0.001)
+    still, driven = perceive(log), perceive(log, Use(motion=(1.0, 0.0)))
+    assert driven.counts.moved == 2 and np.array_equal(driven.safe, still.safe) and still.safe.sum() > 200
+    other = perceive(replace(log, geometry=np.array([[-0.5 * math.pi, math.pi / 180], [-0.5 * math.pi, 0.0175]])))
+    assert other.counts.turned == 1 and other.safe[1].sum() > 100

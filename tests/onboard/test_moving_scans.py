@@ -194,3 +194,13 @@ def test_driving_with_a_lidar_that_turns_touches_nothing(seed, first_deg):
         dx, dy, c, s = x - x0, y - y0, math.cos(yaw0), math.sin(yaw0)
         moved = (c * dx + s * dy, c * dy - s * dx, yaw - yaw0)
     assert nearest > 0.15 and math.hypot(goal[0] - x, goal[1] - y) < 0.3
+
+
+@pytest.mark.parametrize("clockwise", [False, True])
+@pytest.mark.parametrize("fov", [180.0, 270.0])
+def test_the_edges_of_a_field_bar_nothing_that_was_seen(fov, clockwise):
+    """In the open; once the outermost ray stood as a wall from the body outwards, and nothing was safe."""
+    beams = int(fov) + 1
+    lidar = Lidar(beams, fov_deg=fov, clockwise=clockwise, time_increment_s=PERIOD_S / beams)
+    found, _ = driven(lidar, 0.5, 0.0, lambda t: np.full(beams, np.inf))
+    assert np.isinf(found).all()

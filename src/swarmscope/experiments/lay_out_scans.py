@@ -17,12 +17,11 @@ from swarmscope.onboard.perception.rays import Rays
 from swarmscope.onboard.perception.reproject import Grid, settle
 from swarmscope.onboard.readings import own_rays, translate
 from swarmscope.onboard.rig import GUARDING, SAFETY, SHARING, Guarding, Rig, Safety, Sharing
-from swarmscope.onboard.sweep import from_many_places, from_one_place, is_bridged, mended
+from swarmscope.onboard.sweep import from_many_places, is_bridged, mended
 from swarmscope.onboard.trail import poses_at, seen_from, then
 from swarmscope.sim.scan_files import ScanLog
 
 CENTRED = (0.0, 0.0, 0.0)
-HERE = (0.0, 0.0, 0.0)
 
 
 class Use(NamedTuple):
@@ -114,13 +113,11 @@ def lay_out_scans(log: ScanLog, use: Use, rig: Rig) -> tuple[np.ndarray, Counts]
         settle(values, layout.order, sensor.range_min, sensor.range_max, raw)
         raw[own] = np.nan
         counted[k] = _counted(values[layout.order], raw, own, layout, rig)
-        if was_at is not None:
-            back = was_at(k, use.beam_step * step_s * layout.order)
-            scans[k] = from_many_places(raw, layout, back, CENTRED, rig, wanted)
-        elif same_rays(layout, whole):
+        if was_at is None and same_rays(layout, whole):
             scans[k] = raw
-        else:
-            scans[k] = from_one_place(raw, layout, HERE, CENTRED, rig, wanted)
+            continue
+        back = np.zeros((raw.size, 3)) if was_at is None else was_at(k, use.beam_step * step_s * layout.order)
+        scans[k] = from_many_places(raw, layout, back, CENTRED, rig, wanted)
     turned = len(keys) - keys.count(_commonest(keys))
     found = dict(zip(COUNTED, counted.T, strict=True))
     return scans, Counts(**found, moved=0 if was_at is None else len(keys), turned=turned)
