@@ -80,6 +80,15 @@ def test_a_broken_reading_bars_no_way_when_a_scan_is_moved_on(hole, moved):
     assert np.nanmin(driver.robot.rows.scan) < 0.3
 
 
+def test_what_an_eccentric_sensor_is_blind_to_is_not_bridged():
+    """It measures from 0.2 m on: two readings that are none may be a post as thick as a thumb beside the body."""
+    scan = np.full(360, 3.0, np.float32)
+    scan[150:153] = np.nan
+    for least, near in ((0.0, False), (0.2, True)):
+        found = seen(Lidar(mount=(0.1, 0.0, 0.0), range_min_m=least), scan)
+        assert (found.min() < 0.3) == near
+
+
 def test_a_lidar_that_hangs_upside_down():
     hanging, mirrored = Lidar(upside_down=True), np.roll(box_left()[::-1], 1)
     assert np.array_equal(seen(hanging, mirrored), box_left())

@@ -17,7 +17,7 @@ from swarmscope.onboard.lidar import Layout, Lidar, grid_of, lay_out, layout_of,
 from swarmscope.onboard.perception.reproject import NEAR_M, NEAR_STEPS, Grid, settle
 from swarmscope.onboard.readings import must_be_millimetres, own_rays, translate
 from swarmscope.onboard.rig import Rig
-from swarmscope.onboard.sweep import from_many_places, from_one_place
+from swarmscope.onboard.sweep import Taken, from_many_places, from_one_place
 from swarmscope.onboard.trail import Trail
 
 MOST_READINGS = 8192
@@ -142,7 +142,10 @@ class Scans:
         if self._told.direct and self._centred and _is_here(back, self.grid.rays.increment):
             out[:] = self._scan
             return
-        out[:] = from_one_place(self._scan, self._told.layout, back, self._lidar.mount, self._rig, self._wanted)
+        out[:] = from_one_place(self._taken(), back, self._rig, self._wanted)
+
+    def _taken(self) -> Taken:
+        return Taken(self._scan, self._told.layout, self._lidar.mount, self._told.least_m)
 
     def _write_straight(self, trail: Trail, out: np.ndarray) -> None:
         """Write a scan whose readings were taken one after the other."""
@@ -153,7 +156,7 @@ class Scans:
         if self._told.direct and self._centred and np.all(np.abs(back) <= (0.7 * NEAR_M, 0.7 * NEAR_M, near)):
             out[:] = self._scan
             return
-        out[:] = from_many_places(self._scan, self._told.layout, back, self._lidar.mount, self._rig, self._wanted)
+        out[:] = from_many_places(self._taken(), back, self._rig, self._wanted)
 
     def _check_age(self, age_s: float) -> None:
         if age_s > STALE_PERIODS * self._period_s:

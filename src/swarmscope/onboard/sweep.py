@@ -6,6 +6,9 @@ anywhere. A robot that turns against its beams has not seen all round when a sca
 
 from __future__ import annotations
 
+import math
+from typing import NamedTuple
+
 import numpy as np
 
 from swarmscope.geometry import TWO_PI, Pose
@@ -22,18 +25,30 @@ BRIDGED = 1.001
 """A hole that is filled farther away than so many times what touches the body is one that was bridged."""
 
 
-def from_one_place(scan: np.ndarray, layout: Layout, back: Pose, mount: Mount, rig: Rig, wanted: Grid) -> np.ndarray:
-    """Return ``scan (B,)``, taken when the body was at ``back``, as seen from where it is now, along ``wanted``."""
+class Taken(NamedTuple):
+    """A scan and the sensor that took it."""
+
+    scan: np.ndarray
+    """(B,) [m] along the rays of ``layout``."""
+    layout: Layout
+    mount: Mount
+    least_m: float
+    """Nearer things the sensor does not measure."""
+
+
+def from_one_place(taken: Taken, back: Pose, rig: Rig, wanted: Grid) -> np.ndarray:
+    """Return a scan, taken when the body was at ``back``, as seen from where it is now, along ``wanted``."""
+    scan, layout, mount, _ = taken
     x, y, _ = then(back, (*mount[:2], 0.0))
     out = np.empty(wanted.cos.size, np.float32)
-    reproject(bridged(scan, layout, rig), layout.rays, Seat(x, y, back[2], back[0], back[1], _core(rig)), wanted, out)
+    seat = Seat(x, y, back[2], back[0], back[1], _core(rig))
+    reproject(bridged(scan, layout, rig, _blind_m(taken)), layout.rays, seat, wanted, out)
     return out
 
 
-def from_many_places(
-    scan: np.ndarray, layout: Layout, back: np.ndarray, mount: Mount, rig: Rig, wanted: Grid
-) -> np.ndarray:
+def from_many_places(taken: Taken, back: np.ndarray, rig: Rig, wanted: Grid) -> np.ndarray:
     """Return the same of a scan whose ray n was taken when the body was at ``back[n]`` (B, 3)."""
+    scan, layout, mount, _ = taken
     rays = layout.rays
     angles = rays.start + rays.increment * np.arange(scan.size) + back[:, 2]
     scan, angles, back = _with_gap(scan, layout, angles, back)
@@ -42,20 +57,25 @@ def from_many_places(
     turned = angles - rays.start - rays.increment * np.arange(scan.size)
     out = np.empty(wanted.cos.size, np.float32)
     seats = np.column_stack([x, y, turned, back[:, 0], back[:, 1]])
-    straighten(bridged(scan, layout, rig), rays, seats, _core(rig), wanted, out)
+    straighten(bridged(scan, layout, rig, _blind_m(taken)), rays, seats, _core(rig), wanted, out)
     return out
 
 
-def bridged(scan: np.ndarray, layout: Layout, rig: Rig) -> np.ndarray:
+def _blind_m(taken: Taken) -> float:
+    """Return how far from the body's centre something may be that is too near to be measured [m]."""
+    return taken.least_m + math.hypot(taken.mount[0], taken.mount[1])
+
+
+def bridged(scan: np.ndarray, layout: Layout, rig: Rig, blind_m: float) -> np.ndarray:
     """Return ``scan (M,)`` with the holes bridged that no body fits into; wider ones stay broken."""
     holes = np.isnan(scan)
     if not holes.any():
         return scan
-    whole = mended(scan, layout, rig)
+    whole = mended(scan, layout, rig, blind_m)
     return np.where(holes & is_bridged(whole, rig), whole, scan)
 
 
-def mended(scan: np.ndarray, layout: Layout, rig: Rig) -> np.ndarray:
+def mended(scan: np.ndarray, layout: Layout, rig: Rig, blind_m: float) -> np.ndarray:
     """Return ``scan (M,)`` along the rays of ``layout`` as ``mend`` leaves it."""
     rays, sensor = layout.rays, rig.sensor
     whole, broken = scan.copy(), np.empty(scan.size, np.uint8)
@@ -64,7 +84,7 @@ def mended(scan: np.ndarray, layout: Layout, rig: Rig) -> np.ndarray:
         angle_min=rays.start,
         increment=rays.increment,
         wraps=rays.closed,
-        range_min=sensor.range_min,
+        range_min=max(sensor.range_min, blind_m),
         range_max=sensor.range_max,
         range_sigma=sensor.range_sigma,
         position_sigma=sensor.position_sigma,
