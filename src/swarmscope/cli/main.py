@@ -94,15 +94,15 @@ def run(
         ),
     ] = None,
     resolution: Annotated[
-        float | None, typer.Option(help="Side of the map's cells [m], where its file does not say it.")
+        float | None, typer.Option(help="Side of the map's cells, metres, where its file does not say it.")
     ] = None,
     number: Annotated[int | None, typer.Option(min=0, help="Which maze of a .npz of ORION's.")] = None,
     start: Annotated[
         list[str] | None,
-        typer.Option(metavar="X,Y[,DEG]", help="Start of the next robot on the map [m, m, degrees]; repeatable."),
+        typer.Option(metavar="X,Y[,DEG]", help="Start of the next robot on the map, metres and degrees; repeatable."),
     ] = None,
     goal: Annotated[
-        list[str] | None, typer.Option(metavar="X,Y", help="Goal of the next robot on the map [m]; repeatable.")
+        list[str] | None, typer.Option(metavar="X,Y", help="Goal of the next robot on the map, metres; repeatable.")
     ] = None,
     trips: Annotated[str | None, typer.Option(help="Moving AI .scen file: starts and goals on the map.")] = None,
     first_trip: Annotated[int | None, typer.Option(min=0, help="Trip of robot 0, else the file's first, 0.")] = None,
@@ -169,9 +169,9 @@ def perceive(
     out: Annotated[Path | None, typer.Option(help="Folder for features.csv and perceive.png.")] = None,
     topic: Annotated[str | None, typer.Option(help="Topic with the scans, where a bag has several.")] = None,
     every: Annotated[int, typer.Option(min=1, help="Only every so manieth scan.")] = 1,
-    range_m: Annotated[float | None, typer.Option("--range", help="Range that the robots use [m], else 5.")] = None,
+    range_m: Annotated[float | None, typer.Option("--range", help="Range that the robots use, metres, else 5.")] = None,
     radius_m: Annotated[
-        float | None, typer.Option("--radius", help="Radius and half width of the robot [m], else 0.15.")
+        float | None, typer.Option("--radius", help="Radius and half width of the robot, metres, else 0.15.")
     ] = None,
     set_: Annotated[
         list[str] | None,
@@ -191,16 +191,16 @@ def perceive(
     ] = None,
     upside_down: Annotated[bool, typer.Option("--upside-down", help="The LiDAR is mounted upside down.")] = False,
     fov: Annotated[
-        float | None, typer.Option(help="Field of view [degrees] of files that do not say it; 360: a closed circle.")
+        float | None, typer.Option(help="Degrees that scans cover, for files that do not say it; 360: a closed circle.")
     ] = None,
     first: Annotated[
-        float | None, typer.Option(help="Where the first reading looks then [degrees], else -fov/2.")
+        float | None, typer.Option(help="Degrees at which the first reading looks then, else -fov/2.")
     ] = None,
     time_increment: Annotated[
-        float | None, typer.Option(help="From one reading to the next [s], else as the file says; 0: all at once.")
+        float | None, typer.Option(help="Seconds from one reading to the next, else as the file says; 0: all at once.")
     ] = None,
-    speed: Annotated[float | None, typer.Option(help="The robot's speed [m/s], where there is no odometry.")] = None,
-    turn_rate: Annotated[float | None, typer.Option(help="Its turn rate [rad/s], counter-clockwise.")] = None,
+    speed: Annotated[float | None, typer.Option(help="The robot's speed, m/s, where there is no odometry.")] = None,
+    turn_rate: Annotated[float | None, typer.Option(help="Its turn rate, rad/s, counter-clockwise.")] = None,
 ) -> None:
     """Safe directions and features of recorded scans, with the time that they take."""
     from swarmscope.cli.perceive import perceive_command, read_mask, sheet_of_options
