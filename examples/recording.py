@@ -19,8 +19,9 @@ scans, beams = log.ranges_m.shape
 poses = np.zeros((scans, 3)) if log.odom is None else log.odom
 stamps = log.stamp_s if np.isfinite(log.stamp_s).all() else 0.25 * np.arange(scans)
 end = poses[-1] if log.odom is not None else np.array([10.0, 0.0, 0.0])  # the goal: where the recording ends
-field_deg, first_deg = math.degrees(log.increment * (beams - 1)), math.degrees(log.angle_min)
-lidar = Lidar(beams, range_m=min(5.0, log.range_max), fov_deg=field_deg, first_deg=first_deg)
+step_deg, first_deg = math.degrees(abs(log.increment)), math.degrees(log.angle_min)
+field_deg = 360.0 if step_deg * (beams + 0.5) > 360.0 else step_deg * (beams - 1)
+lidar = Lidar(beams, min(5.0, log.range_max), log.range_min, field_deg, first_deg, clockwise=log.increment < 0.0)
 
 robot = Robot("nav-scope", Body(radius_m=0.25, half_width_m=0.25, v_max_mps=1.5), lidar, address=7, rate_hz=4.0)
 robot.warm_up(print)

@@ -34,9 +34,11 @@ ROBOTS = (
     (Body(), Lidar()),
     (Body(), Lidar(720, 12.0, range_min_m=0.1, first_deg=0.0, clockwise=True, mount=(0.1, -0.05, 0.3))),
     (Body(radius_m=0.3, half_width_m=0.2, v_max_mps=1.5), Lidar(181, 8.0, fov_deg=180.0, position_sigma=0.02)),
-    (Body(radius_m=0.05, half_width_m=0.05), Lidar(8, 3.0)),
+    (Body(radius_m=0.05, half_width_m=0.05), Lidar(32, 3.0)),
     (Body(), Lidar(1081, 30.0, fov_deg=270.0, mount=(0.0, 0.0, 0.8), range_sigma=0.02)),
-)
+    (Body(), Lidar(400, 5.0, 0.1, first_deg=9.0, upside_down=True, no_return_m=(0.0,), mount=(0.1, 0.0, 1.0),
+                   masks_deg=((40.0, 50.0), (170.0, -150.0)), time_increment_s=0.0005)),
+)  # fmt: skip
 HOSTILE: tuple[Any, ...] = (
     math.nan, math.inf, -math.inf, 1e300, -1e300, 1e-320, 3e38, -0.0, 0, 10**30, 10**400, None, "x", b"", (), [], {},
     True, np.float32("nan"), np.int8(-3), np.array(1.0), np.array([1.0, 2.0]), 1j, object(), (math.nan, 1.0),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import stat
 from pathlib import Path
 from typing import Any
@@ -31,11 +32,13 @@ def check_regular(path: Path, most_bytes: int | None = MOST_BYTES) -> None:
 
 
 def read_text(path: Path, most_bytes: int = MOST_BYTES) -> str:
-    """Return the text of a regular file, without a byte order mark. Errors: InputFileError."""
+    """Return the text of a regular file, without a byte order mark; UTF-16 has one. Errors: InputFileError."""
     check_regular(path, most_bytes)
     try:
-        return path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError:
+        with path.open("rb") as file:
+            wide = file.read(2) in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+        return path.read_text(encoding="utf-16" if wide else "utf-8-sig")
+    except UnicodeError:
         raise InputFileError(path, "is not text") from None
     except OSError as error:
         raise InputFileError(path, f"cannot be read ({error.strerror})") from None

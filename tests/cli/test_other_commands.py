@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import csv
+import re
 import shutil
 
 import numpy as np
 import pytest
+import typer
 from command_line import SMALL, refused, swarmscope
 from typer.testing import CliRunner
 
@@ -139,3 +141,11 @@ def test_version():
 def test_a_mistyped_command_is_named():
     result = CliRunner().invoke(app, ["rn"])
     assert result.exit_code == 2 and "did you mean 'run'" in result.stderr.lower()
+
+
+def test_no_word_of_a_help_text_is_lost_as_markup():
+    """Rich takes [m] for markup, and says nothing."""
+    command = typer.main.get_command(app)
+    texts = [option.help or "" for one in command.commands.values() for option in one.params if hasattr(option, "help")]
+    assert len(texts) > 50
+    assert not [text for text in texts if re.search(r"\[[a-z/]", text)]

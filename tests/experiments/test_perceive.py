@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import csv
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from helpers import circles_world, one_robot, rig_of, scan_at
 from swarmscope.errors import ConfigError, InputFileError
-from swarmscope.experiments.perceive import Use, perceive, write_features
+from swarmscope.experiments.lay_out_scans import Use
+from swarmscope.experiments.perceive import perceive, write_features
+from swarmscope.onboard.body import Body
 from swarmscope.onboard.perception.safety import safe_directions
-from swarmscope.onboard.rig import AHEAD
+from swarmscope.onboard.rig import AHEAD, Safety, Sharing
 from swarmscope.onboard.tick import own_features
 from swarmscope.sim.scan_files import SCAN_FOLDER, ScanLog, load_scans
-from swarmscope.viewing.perceive_picture import PANELS, write_perceive_picture
+from swarmscope.viewing.perceive_picture import PANELS, fan_reach, write_perceive_picture
 
 
 def log_of(ranges, fov=2.0 * math.pi, range_max=30.0, range_min=0.0):
@@ -109,7 +112,7 @@ def test_single_broken_readings_close_no_direction_and_are_counted(beams, walls_
     torn[list(beams)] = np.nan
     seen = perceive(log_of(np.stack([whole, torn])))
     assert seen.safe.all()
-    assert seen.broken.tolist() == [0, len(beams)]
+    assert seen.counts.broken.tolist() == [0, len(beams)]
     assert len(seen.features[1]) == len(seen.features[0])
 
 
@@ -118,7 +121,7 @@ def test_a_hole_in_which_a_body_fits_closes_its_directions():
     torn[120:240] = np.nan
     seen = perceive(log_of(torn))
     assert not seen.safe[0, 120:240].any() and seen.safe[0, :25].all()
-    assert seen.broken.tolist() == [120]
+    assert seen.counts.broken.tolist() == [120]
 
 
 def test_the_log_itself_is_not_changed(forest_scans):
@@ -146,8 +149,8 @@ def _finite(values):
         ({"range_m": 0.0}, "--range"),
         ({"range_m": math.nan}, "--range"),
         ({"range_m": math.inf}, "--range"),
-        ({"radius_m": 0.0}, "radius"),
-        ({"radius_m": math.nan}, "radius"),
+        ({"body": Body(radius_m=0.0)}, "radius"),
+        ({"body": Body(radius_m=math.nan)}, "radius"),
         ({"beam_step": 0}, "--beam-step"),
         ({"beam_step": 500}, "two beams"),
     ],
@@ -155,6 +158,12 @@ def _finite(values):
 def test_impossible_options_are_refused(options, words, forest_scans):
     with pytest.raises(ConfigError, match=words):
         perceive(log_of(forest_scans), Use(**options))
+
+
+def test_more_readings_than_a_robot_uses_are_refused():
+    with pytest.raises(ConfigError, match="--beam-step"):
+        perceive(log_of(np.full(9000, 3.0)))
+    assert perceive(log_of(np.full(9000, 3.0)), Use(beam_step=10)).safe.shape == (1, 900)
 
 
 def test_a_range_below_the_scanners_smallest_is_refused(forest_scans):
@@ -183,3 +192,90 @@ def test_picture_says_when_it_cannot_be_written(forest_scans, tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(InputFileError, match="cannot be written"):
         write_perceive_picture(tmp_path / "file" / "p.png", perceive(log_of(forest_scans)), "t")
+
+
+@pytest.mark.parametrize("walls_m", [0.5, 1.0, 4.0])
+def test_the_fan_of_safe_directions_ends_before_every_return(walls_m, forest_scans):
+    """Returns are drawn over no fan: no point of a scan lies within the polygon of any run of safe directions."""
+    seen = perceive(log_of(np.vstack([forest_scans, np.full((1, 360), walls_m)])))
+    for k in range(4):
+        reach, ranges = fan_reach(seen, k), seen.ranges_m[k]
+        assert (reach <= 2.0).all() and (reach[np.isinf(ranges)] > 0.0).all()
+        for n in np.flatnonzero(np.isfinite(ranges)):
+            assert max(reach[n - 1], reach[n], reach[(n + 1) % 360]) <= 0.971 * ranges[n]
+
+
+def corridor_log(v, w, scans=4, beams=360, hz=5.0, **more):
+    """What a LiDAR that turns once a scan sees in a corridor 2 m wide, on a robot that drives an arc."""
+    rows, odom, stamps = [], [], np.arange(scans) / hz
+    for stamp in stamps:
+        t = stamp + np.arange(beams) / beams / hz
+        x, y, yaw = on_arc(t, v, w)
+        angles = yaw - math.pi + 2.0 * math.pi * np.arange(beams) / beams
+        with np.errstate(divide="ignore"):
+            side = np.where(np.sin(angles) > 0.0, 1.0 - y, -1.0 - y) / np.sin(angles)
+            end = np.where(np.cos(angles) > 0.0, 4.0 - x, -4.0 - x) / np.cos(angles)
+        rows.append(np.minimum(side, end))
+        odom.append(np.array(on_arc(stamp, v, w)))
+    log = log_of(rows)
+    return replace(log, stamp_s=stamps, odom=np.array(odom), time_increment=1.0 / hz / beams, **more)
+
+
+def on_arc(t, v, w):
+    return (v / w * np.sin(w * t), v / w * (1.0 - np.cos(w * t)), w * t) if w else (v * t, 0.0 * t, 0.0 * t)
+
+
+def bent(seen, k, pose):
+    """How far the median return of scan k lies off the walls of the corridor, and the 9th decile [m]."""
+    angles, ranges = seen.angles + pose[2], seen.ranges_m[k]
+    near = np.isfinite(ranges)
+    x, y = pose[0] + ranges[near] * np.cos(angles[near]), pose[1] + ranges[near] * np.sin(angles[near])
+    off = np.minimum(np.abs(np.abs(y) - 1.0), np.abs(np.abs(x) - 4.0))
+    return np.quantile(off, [0.5, 0.9])
+
+
+@pytest.mark.parametrize(("v", "w"), [(1.0, 0.0), (1.0, 0.8), (0.2, -1.0)])
+def test_scans_are_put_right_for_the_robots_own_motion(v, w):
+    """By odometry, and by the speed that the user says; at 1 m/s and 5 Hz; without either they are bent."""
+    log = corridor_log(v, w)
+    last_s = [stamp + 0.2 * 359 / 360 for stamp in log.stamp_s]
+    for chosen, use in ((log, Use()), (replace(log, odom=None), Use(motion=(v, w)))):
+        seen = perceive(chosen, use)
+        assert seen.counts.moved == 4
+        for k, at in enumerate(last_s):
+            assert bent(seen, k, on_arc(at, v, w))[1] < 0.002
+    for chosen, use in ((replace(log, odom=None), Use()), (log, Use(time_increment_s=0.0))):
+        seen = perceive(chosen, use)
+        assert seen.counts.moved == 0
+        assert bent(seen, 1, on_arc(last_s[1], v, w))[1] > 0.03
+
+
+def test_scans_that_take_too_long_are_refused():
+    with pytest.raises(ConfigError, match=r"would take 35\.9 s"):
+        perceive(corridor_log(1.0, 0.0), Use(time_increment_s=0.1))
+
+
+def test_the_whole_data_sheet_counts(forest_scans):
+    """A wider robot has fewer safe directions, and so has a faster one, or one that keeps off more."""
+    log = log_of(forest_scans)
+    free = [
+        perceive(log, use).safe.sum()
+        for use in (
+            Use(),
+            Use(body=Body(radius_m=0.3, half_width_m=0.3)),
+            Use(body=Body(v_max_mps=2.0)),
+            Use(safety=Safety(margin_m=0.3)),
+        )
+    ]
+    assert all(less < free[0] for less in free[1:])
+    assert (perceive(log, Use(range_min_m=2.0)).counts.below > 0).all()
+    exact = perceive(log, Use(sharing=Sharing(exact_features=True)))
+    assert exact.packet_bytes.min() > perceive(log).packet_bytes.max() > 20
+
+
+def test_half_a_circle_in_the_open_is_free_while_the_robot_drives():
+    log = replace(log_of(np.full((2, 181), np.inf), fov=math.pi), time_increment=0.001)
+    still, driven = perceive(log), perceive(log, Use(motion=(1.0, 0.0)))
+    assert driven.counts.moved == 2 and np.array_equal(driven.safe, still.safe) and still.safe.sum() > 200
+    other = perceive(replace(log, geometry=np.array([[-0.5 * math.pi, math.pi / 180], [-0.5 * math.pi, 0.0175]])))
+    assert other.counts.turned == 1 and other.safe[1].sum() > 100

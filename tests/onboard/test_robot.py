@@ -409,7 +409,7 @@ def test_warming_up_says_what_it_did():
     said = []
     robot = Robot("nav-scope", Body(), Lidar(), address=1)
     done = robot.warm_up(said.append)
-    assert set(done.compiled) | set(done.loaded) == {"step_nav_scope", "settle", "reproject"}
+    assert set(done.compiled) | set(done.loaded) == {"step_nav_scope", "settle", "reproject", "straighten"}
     assert done.seconds > 0.0
     assert said[0].startswith("nav-scope: ")
     assert robot.warm_up().compiled == ()

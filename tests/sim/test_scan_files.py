@@ -74,7 +74,7 @@ def test_metres_layout(tmp_path: Path) -> None:
 
 def test_rep_117_minus_infinity_is_too_close(tmp_path: Path) -> None:
     log = load_scans(_npz(tmp_path / "a.npz", ranges_m=np.array([[-np.inf, 1.0]])))
-    assert log.ranges_m.tolist() == [[0.0, 1.0]]
+    assert log.ranges_m.tolist() == [[-np.inf, 1.0]]
 
 
 @pytest.mark.parametrize("suffix", [".npz", ".csv"])
@@ -89,8 +89,9 @@ def test_missing_empty_folder(tmp_path: Path, suffix: str) -> None:
 
 
 def test_unknown_kind_of_file(tmp_path: Path) -> None:
-    (tmp_path / "a.bag").write_bytes(b"x")
-    _refused(tmp_path / "a.bag", r"\.npz, \.csv")
+    for name, words in (("a.pcd", r"\.npz, \.csv"), ("a.csv.gz", "unpack it first"), ("a.xlsx", "save it as CSV")):
+        (tmp_path / name).write_bytes(b"x")
+        _refused(tmp_path / name, words)
 
 
 @pytest.mark.parametrize(
@@ -165,6 +166,7 @@ def test_archive_that_claims_too_much(tmp_path: Path, monkeypatch: pytest.Monkey
         ({"angle_min": np.ones(2)}, "one finite number"),
         ({"angle_min": "east"}, "one finite number"),
         ({"angle_increment": 0.0}, "angle_increment is 0"),
+        ({"angle_increment": 1e-300}, "too close together"),
         ({"angle_increment": 4000.0}, "more than one turn"),
         ({"angle_increment": -4000.0}, "more than one turn"),
         ({"range_max": 0.1}, "0 <= min < max"),
@@ -195,6 +197,9 @@ def test_wrong_arrays(tmp_path: Path, changes: dict[str, object], match: str) ->
         ("FLASER 3 1 2\n", "line 1: torn: it ends after 4 words"),
         ("FLASER many 1 2\n", "line 1: 'many' is not a number"),
         ("FLASER 1e300 1 2\n", "line 1: torn"),
+        ("FLASER -inf 1 2\n", "line 1: torn"),
+        ("FLASER nan 1 2\n", "line 1: torn"),
+        ("ROBOTLASER1 0 -1 3 1 20 0 0 1 1.0 -inf 1\n", "line 1: torn"),
         (HEADER + "nan,nan,nan\n", "only NaN"),
         ("# angle_mni=0\n" + HEADER + "1,2,3\n", "unknown key 'angle_mni'; did you mean 'angle_min'"),
         (HEADER.replace("=8", "=far") + "1,2,3\n", "line 1: 'far' is not a number"),

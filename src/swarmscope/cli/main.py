@@ -95,15 +95,15 @@ def run(
         ),
     ] = None,
     resolution: Annotated[
-        float | None, typer.Option(help="Side of the map's cells [m], where its file does not say it.")
+        float | None, typer.Option(help="Side of the map's cells, metres, where its file does not say it.")
     ] = None,
     number: Annotated[int | None, typer.Option(min=0, help="Which maze of a .npz of ORION's.")] = None,
     start: Annotated[
         list[str] | None,
-        typer.Option(metavar="X,Y[,DEG]", help="Start of the next robot on the map [m, m, degrees]; repeatable."),
+        typer.Option(metavar="X,Y[,DEG]", help="Start of the next robot on the map, metres and degrees; repeatable."),
     ] = None,
     goal: Annotated[
-        list[str] | None, typer.Option(metavar="X,Y", help="Goal of the next robot on the map [m]; repeatable.")
+        list[str] | None, typer.Option(metavar="X,Y", help="Goal of the next robot on the map, metres; repeatable.")
     ] = None,
     trips: Annotated[str | None, typer.Option(help="Moving AI .scen file: starts and goals on the map.")] = None,
     first_trip: Annotated[int | None, typer.Option(min=0, help="Trip of robot 0, else the file's first, 0.")] = None,
@@ -162,32 +162,64 @@ def config(
 @app.command(
     epilog="Examples:\n\n"
     "[bold]swarmscope perceive malaga_telecom_2006_sick_lms --out runs/perceive[/bold]\n\n"
-    "[bold]swarmscope perceive turtlebot.csv --no-return 0 --range 3.5[/bold]\n\n"
-    "[bold]swarmscope perceive scans.csv --mask 40..50 --mask=-50..-40[/bold]"
+    "[bold]swarmscope perceive turtlebot.csv --no-return 0 --set robot.v_max_mps=0.22 --radius 0.11[/bold]\n\n"
+    "[bold]swarmscope perceive drive.bag --topic /scan --every 10 --out runs/drive[/bold]\n\n"
+    "[bold]swarmscope perceive numbers.csv --fov 270 --mask 40..50 --mask=-50..-40[/bold]"
 )
 def perceive(
     scans: Annotated[
-        str, typer.Argument(help="Scan file (.npz, .csv, .txt, CARMEN .log), or the name of a packaged one.")
+        str,
+        typer.Argument(help="Scans: .npz, .csv, .txt, CARMEN .log, rosbag2, .mcap, .bag, or a name of packaged ones."),
     ],
     out: Annotated[Path | None, typer.Option(help="Folder for features.csv and perceive.png.")] = None,
-    range_m: Annotated[float, typer.Option("--range", help="Range that the robots use, metres.")] = 5.0,
-    radius_m: Annotated[float, typer.Option("--radius", help="The robot's radius, metres.")] = 0.15,
+    topic: Annotated[str | None, typer.Option(help="Topic with the scans, where a bag has several.")] = None,
+    every: Annotated[int, typer.Option(min=1, help="Only every so manieth scan.")] = 1,
+    range_m: Annotated[float | None, typer.Option("--range", help="Range that the robots use, metres, else 5.")] = None,
+    radius_m: Annotated[
+        float | None, typer.Option("--radius", help="Radius and half width of the robot, metres, else 0.15.")
+    ] = None,
+    set_: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set", metavar="KEY.PATH=VALUE", help="A scenario's key: robot, guard, safety, noise, lidar; repeatable."
+        ),
+    ] = None,
+    scenario: Annotated[Path | None, typer.Option(help="Scenario file with the robot's data sheet.")] = None,
     beam_step: Annotated[int, typer.Option(min=1, help="Use every so manieth beam.")] = 1,
     no_return: Annotated[
-        float | None, typer.Option(help="The reading that means no return, beside inf: 0 for some LiDARs.")
+        list[float] | None,
+        typer.Option(help="A reading that means no return, beside inf: 0, -1, nan for some LiDARs; repeatable."),
     ] = None,
     mask: Annotated[
         list[str] | None,
         typer.Option(metavar="FROM..TO", help="Degrees in which the robot sees its own posts; repeatable."),
     ] = None,
     upside_down: Annotated[bool, typer.Option("--upside-down", help="The LiDAR is mounted upside down.")] = False,
+    fov: Annotated[
+        float | None, typer.Option(help="Degrees that scans cover, for files that do not say it; 360: a closed circle.")
+    ] = None,
+    first: Annotated[
+        float | None, typer.Option(help="Degrees at which the first reading looks then, else -fov/2.")
+    ] = None,
+    time_increment: Annotated[
+        float | None, typer.Option(help="Seconds from one reading to the next, else as the file says; 0: all at once.")
+    ] = None,
+    speed: Annotated[float | None, typer.Option(help="The robot's speed, m/s, where there is no odometry.")] = None,
+    turn_rate: Annotated[float | None, typer.Option(help="Its turn rate, rad/s, counter-clockwise.")] = None,
 ) -> None:
     """Safe directions and features of recorded scans, with the time that they take."""
-    from swarmscope.cli.perceive import perceive_command, read_mask
-    from swarmscope.experiments.perceive import Use
+    from swarmscope.cli.perceive import perceive_command, read_mask, sheet_of_options
+    from swarmscope.sim.scan_read import Ask
 
-    masks = [read_mask(text) for text in mask or []]
-    perceive_command(scans, out, Use(range_m, radius_m, beam_step, no_return, masks, upside_down))
+    use = sheet_of_options(scenario, set_ or [], range_m, radius_m)._replace(
+        beam_step=beam_step,
+        no_return=no_return or [],
+        masks_deg=[read_mask(text) for text in mask or []],
+        upside_down=upside_down,
+        time_increment_s=time_increment,
+        motion=None if speed is None and turn_rate is None else (speed or 0.0, turn_rate or 0.0),
+    )
+    perceive_command(scans, out, Ask(topic, every, fov, first), use)
 
 
 @app.command(epilog="Example: [bold]swarmscope replay runs/first --open[/bold]")

@@ -9,7 +9,7 @@ from typing import Any
 from swarmscope.errors import ConfigError, UnknownNameError
 from swarmscope.onboard.body import Body, protection_model
 from swarmscope.onboard.edge import ADDRESSES, short
-from swarmscope.onboard.lidar import Lidar, finite, sensor_of
+from swarmscope.onboard.lidar import Lidar, finite, sensor_of, sweep_s
 from swarmscope.onboard.planners import Planner, load_planner
 from swarmscope.onboard.rig import GUARDING, SAFETY, SHARING, Guarding, Rig, Safety, Sharing, make_rig
 from swarmscope.onboard.scans import Scans
@@ -93,8 +93,9 @@ def rig_of(body: Body, lidar: Lidar, scans: Scans, options: Mapping[str, Any]) -
     reach = protection_model(body).r + offset
     if lidar.range_m < reach:
         raise ConfigError("lidar.range_m", f"{lidar.range_m:g} m is less than this body needs to stop, {reach:.2f} m")
-    parts = (_part(kind, options) for kind in (Guarding, Safety, Sharing))
-    return make_rig(body, all_round(sensor_of(lidar, scans.grid)), *parts)
+    guarding, safety, sharing = (_part(kind, options) for kind in (Guarding, Safety, Sharing))
+    guarding = guarding._replace(latency_s=guarding.latency_s + sweep_s(lidar))  # the oldest reading counts
+    return make_rig(body, all_round(sensor_of(lidar, scans.grid)), guarding, safety, sharing)
 
 
 def _part(kind: Any, options: Mapping[str, Any]) -> Any:

@@ -9,12 +9,15 @@ import numpy as np
 
 from swarmscope.errors import ConfigError
 from swarmscope.geometry import TWO_PI
+from swarmscope.onboard.perception.rays import Rays
 from swarmscope.onboard.sensor import Sensor
 
 FEWEST_BEAMS, MOST_BEAMS = 8, 4096
 LONGEST_M = 1000.0
 FINEST_RAD = math.radians(0.01)
 """Readings lie at least this far apart [rad]."""
+LONGEST_SWEEP_S = 2.0
+"""No scan takes longer [s]."""
 SAME = 0.05
 """Layouts that differ by less than this share of an increment are the same."""
 
@@ -34,24 +37,23 @@ class Lidar(NamedTuple):
     first_deg: float | None = None
     """Direction of the first reading; None: the right edge of the field (-fov/2), the left one of a clockwise LiDAR."""
     clockwise: bool = False
-    """Whether the readings go clockwise, seen from above."""
+    """Whether the readings go clockwise, seen from above a LiDAR that stands upright."""
     mount: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Where the sensor sits and faces on the body: x, y [m] from the body's centre, yaw [rad]."""
     range_sigma: float = 0.0
     """Standard deviation of a range as a fraction of it."""
     position_sigma: float = 0.0
     """Standard deviation of a neighbour's measured position as a fraction of its distance."""
-
-
-class Rays(NamedTuple):
-    """Directions of a scan, counter-clockwise: ray n at ``start + n * increment`` [rad]; plain numbers for kernels."""
-
-    start: float
-    increment: float
-    closed: bool
-    """Whether the last ray is the first one's neighbour."""
-    reach: float
-    """Longest range [m]."""
+    upside_down: bool = False
+    """Whether it hangs upside down: what its own papers and messages call left is right. ``masks_deg`` and ``mount``
+    are as seen from above all the same."""
+    no_return_m: tuple[float, ...] = ()
+    """Readings that mean "no return", beside +inf and what is beyond ``range_m`` [m]: 0 or -1 for some LiDARs; may be
+    NaN."""
+    masks_deg: tuple[tuple[float, float], ...] = ()
+    """Directions, from .. to counter-clockwise, in which the robot sees itself: its posts [degrees]."""
+    time_increment_s: float = 0.0
+    """From one reading to the next, in the order of the scan [s]; 0: all are taken at once."""
 
 
 class Layout(NamedTuple):
@@ -118,14 +120,25 @@ def check_lidar(lidar: Lidar) -> Lidar:
     for name in ("range_sigma", "position_sigma"):
         if not 0.0 <= values[name] < 1.0:
             raise ConfigError(f"lidar.{name}", f"must be at least 0 and below 1, not {getattr(lidar, name)!r}")
-    first = None if lidar.first_deg is None else finite(lidar.first_deg, "lidar.first_deg")
-    checked = Lidar(beams, **values, first_deg=first, clockwise=bool(lidar.clockwise), mount=_mount(lidar.mount))
+    if abs(values["time_increment_s"]) * (beams - 1) > LONGEST_SWEEP_S:
+        sweep = f"{beams} readings would take {abs(values['time_increment_s']) * (beams - 1):.3g} s"
+        raise ConfigError("lidar.time_increment_s", f"{sweep}; a scan takes at most {LONGEST_SWEEP_S:g} s")
+    checked = Lidar(
+        beams,
+        **values,
+        first_deg=None if lidar.first_deg is None else finite(lidar.first_deg, "lidar.first_deg"),
+        clockwise=bool(lidar.clockwise),
+        mount=_mount(lidar.mount),
+        upside_down=bool(lidar.upside_down),
+        no_return_m=_no_return(lidar.no_return_m),
+        masks_deg=_masks(lidar.masks_deg),
+    )
     if abs(_step(checked)) < FINEST_RAD:
         raise ConfigError("lidar.fov_deg", f"{beams} readings in {values['fov_deg']:g} degrees lie too close together")
     return checked
 
 
-_NUMBERS = ("range_m", "range_min_m", "fov_deg", "range_sigma", "position_sigma")
+_NUMBERS = ("range_m", "range_min_m", "fov_deg", "range_sigma", "position_sigma", "time_increment_s")
 
 
 def finite(value: Any, where: str) -> float:
@@ -155,6 +168,33 @@ def _mount(mount: Any) -> tuple[float, float, float]:
     return finite(x, "lidar.mount"), finite(y, "lidar.mount"), finite(yaw, "lidar.mount")
 
 
+def _no_return(values: Any) -> tuple[float, ...]:
+    """Return the values as plain numbers; a single number is one of them."""
+    try:
+        found = tuple(values) if hasattr(values, "__iter__") else (values,)
+        return tuple(value if value != value else finite(value, "lidar.no_return_m") for value in found)  # noqa: PLR0124
+    except TypeError:
+        raise ConfigError("lidar.no_return_m", f"must be readings [m], not {values!r}") from None
+
+
+def _masks(masks: Any) -> tuple[tuple[float, float], ...]:
+    try:
+        pairs = [(first, last) for first, last in masks]
+    except (TypeError, ValueError):
+        raise ConfigError("lidar.masks_deg", f"must be pairs (from, to) [degrees], not {masks!r}") from None
+    return tuple((finite(first, "lidar.masks_deg"), finite(last, "lidar.masks_deg")) for first, last in pairs)
+
+
+def seen_from_above(first: float, step: float, upside_down: bool) -> tuple[float, float]:
+    """Return the first direction and the step of a LiDAR's own papers as they are, counter-clockwise from above."""
+    return (-first, -step) if upside_down else (first, step)
+
+
+def sweep_s(lidar: Lidar) -> float:
+    """Return how long a scan takes, from its first to its last reading [s]."""
+    return abs(lidar.time_increment_s) * (lidar.beams - 1)
+
+
 def _step(lidar: Lidar) -> float:
     """Return how far the next reading lies from one [rad], below 0 clockwise."""
     field = math.radians(lidar.fov_deg)
@@ -170,7 +210,8 @@ def layout_of(lidar: Lidar) -> Layout:
     first = math.radians(lidar.fov_deg) * (0.5 if lidar.clockwise else -0.5)
     if lidar.first_deg is not None:
         first = math.radians(lidar.first_deg)
-    layout = lay_out(lidar.beams, first + lidar.mount[2], _step(lidar), lidar.range_m)
+    first, step = seen_from_above(first, _step(lidar), lidar.upside_down)
+    layout = lay_out(lidar.beams, first + lidar.mount[2], step, lidar.range_m)
     rays, count = layout.rays, layout.order.size
     last = rays.start + rays.increment * (count - 1)
     if not rays.closed and not (rays.start <= 1e-9 and last >= -1e-9 and count >= FEWEST_BEAMS):

@@ -153,10 +153,11 @@ class Robot:
         """Return what to do until the next tick. Never raises: what cannot be used brakes, with a reason.
 
         ``scan`` (B,) [m] is a scan as the data sheet says, or what looks like a ROS LaserScan; None = no new one, the
-        last is moved on. ``scan_s`` is its own stamp on the clock of ``now_s`` [s]. ``goal`` is (bearing [rad],
-        distance [m]), or with the heading wanted there as a third [rad], in the body frame of now; ``moved`` (dx, dy
-        [m], dyaw [rad]) since the last tick, in that of the last tick; ``heading`` [rad] is by compass, 0 = east;
-        ``speed`` [m/s] by the wheels. ``neighbours`` are ``Seen``, ``inbox`` the packets that came in.
+        last is moved on. ``scan_s`` is the stamp of its first reading on the clock of ``now_s`` [s]. ``goal`` is
+        (bearing [rad], distance [m]), or with the heading wanted there as a third [rad], in the body frame of now;
+        ``moved`` (dx, dy [m], dyaw [rad]) since the last tick, in that of the last tick; ``heading`` [rad] is by
+        compass, 0 = east; ``speed`` [m/s] by the wheels. ``neighbours`` are ``Seen``, ``inbox`` the packets that came
+        in.
         """
         try:
             self._mail.put(inbox, self.faults)
@@ -179,10 +180,10 @@ class Robot:
 
     def _set_up(self) -> tuple[Scans, Rows]:
         """Return fresh scans and rows."""
-        clearance = float(self._options["clearance_m"])
-        scans = Scans(self.lidar, self._period_s, self.body.radius_m + clearance)
+        scans = Scans(self.lidar, self._period_s)
         rig = rig_of(self.body, self.lidar, scans, self._options)
         check_horizon(rig, self._period_s)
+        scans.build_in(rig)
         return scans, Rows(self._planner, rig, self.params, self.address, self.boot)
 
     def _take_time_and_motion(self, now_s: Any, moved: Any) -> None:

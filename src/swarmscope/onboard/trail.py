@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections import deque
 
+import numpy as np
+
 from swarmscope import geometry
 from swarmscope.geometry import Pose
-from swarmscope.onboard.edge import angle
 
 KEPT = 64
 """Ticks that are remembered at most."""
+STRAIGHT = 1e-6
+"""An arc that turns by less than this [rad] is a line."""
 
 then = getattr(geometry.then, "py_func", geometry.then)
 seen_from = getattr(geometry.seen_from, "py_func", geometry.seen_from)
@@ -41,18 +44,40 @@ class Trail:
 
         Before its very first tick a robot stood still, for up to ``before_start_s``.
         """
+        if self._ticks and when_s >= self._ticks[-1][0]:
+            return 0.0, 0.0, 0.0
+        poses = self.back_over(np.array([when_s]))
+        return None if poses is None else (float(poses[0, 0]), float(poses[0, 1]), float(poses[0, 2]))
+
+    def back_over(self, when_s: np.ndarray) -> np.ndarray | None:
+        """Return the same for many times (B,), as x, y, yaw (B, 3); yaw does not jump."""
         ticks = self._ticks
         if not ticks:
             return None
-        if when_s >= ticks[-1][0]:
-            return 0.0, 0.0, 0.0
-        if when_s < ticks[0][0]:
-            known = self._first and ticks[0][0] - when_s <= self._before_start_s
-            return seen_from(ticks[-1][1], ticks[0][1]) if known else None
-        k = len(ticks) - 2
-        while ticks[k][0] > when_s:
-            k -= 1
-        (t0, a), (t1, b) = ticks[k], ticks[k + 1]
-        part = (when_s - t0) / (t1 - t0)
-        old = a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1]), a[2] + part * angle(b[2] - a[2])
-        return seen_from(ticks[-1][1], old)
+        first_s = float(when_s.min())
+        if first_s < ticks[0][0] and not (self._first and ticks[0][0] - first_s <= self._before_start_s):
+            return None
+        now = ticks[-1][1]
+        return poses_at(when_s, np.array([t for t, _ in ticks]), np.array([seen_from(now, pose) for _, pose in ticks]))
+
+
+def poses_at(when_s: np.ndarray, stamps_s: np.ndarray, poses: np.ndarray) -> np.ndarray:
+    """Return the poses (B, 3) at ``when_s (B,)`` of a robot that was at ``poses (K, 3)`` at ``stamps_s (K,)``.
+
+    Between two stamps it drove an arc; before the first and after the last it stood.
+    """
+    if len(stamps_s) < 2:
+        return np.repeat(poses[:1], len(when_s), axis=0)
+    yaw = np.unwrap(poses[:, 2])
+    yaw += poses[-1, 2] - yaw[-1]
+    k = np.clip(np.searchsorted(stamps_s, when_s, side="right") - 1, 0, len(stamps_s) - 2)
+    lasts = np.maximum(stamps_s[k + 1] - stamps_s[k], 1e-12)
+    part = np.clip((when_s - stamps_s[k]) / lasts, 0.0, 1.0)
+    turn = yaw[k + 1] - yaw[k]
+    straight = np.abs(turn) < STRAIGHT
+    half = np.where(straight, 1.0, 0.5 * turn)
+    share = np.where(straight, part, np.sin(part * half) / np.sin(half))
+    off = np.where(straight, 0.0, (part - 1.0) * half)
+    dx, dy = poses[k + 1, 0] - poses[k, 0], poses[k + 1, 1] - poses[k, 1]
+    c, s = share * np.cos(off), share * np.sin(off)
+    return np.column_stack([poses[k, 0] + c * dx - s * dy, poses[k, 1] + s * dx + c * dy, yaw[k] + part * turn])

@@ -6,7 +6,9 @@ import time
 from typing import Any, NamedTuple
 
 from swarmscope.onboard.edge import Seen
+from swarmscope.onboard.lidar import LONGEST_SWEEP_S
 from swarmscope.onboard.perception.reproject import reproject, settle
+from swarmscope.onboard.perception.straighten import straighten
 from swarmscope.onboard.planners import Planner
 from swarmscope.onboard.rows import Rows
 from swarmscope.onboard.scans import Scans
@@ -26,7 +28,7 @@ class WarmUp(NamedTuple):
 def warm_up(planner: Planner, scans: Scans, rows: Rows) -> WarmUp:
     """Compile or load what ticks of ``planner`` need, on scans and rows that nobody else uses."""
     begun = time.perf_counter()
-    kernels = (*planner.kernels, settle, reproject)
+    kernels = (*planner.kernels, settle, reproject, straighten)
     before = [_compiled(kernel) for kernel in kernels]
     _rehearse(scans, rows)
     names = [getattr(kernel, "__name__", str(kernel)) for kernel in kernels]
@@ -46,7 +48,7 @@ def _compiled(kernel: Any) -> int:
 
 def _rehearse(scans: Scans, rows: Rows) -> None:
     """Let a robot that nobody will drive live through a few ticks of every kind."""
-    trail = Trail(1e9, 1.0)
+    trail = Trail(1e9, LONGEST_SWEEP_S)
     rows.load()
     for k in range(4):
         now = float(k)
@@ -54,6 +56,8 @@ def _rehearse(scans: Scans, rows: Rows) -> None:
         if k == 0:
             scans.rehearse(now)
         scans.write(trail, 0.0, rows.scan)
+        if k == 1:
+            scans.rehearse_moving(trail, rows.scan)
         rows.scan[: rows.scan.size // 2 if k == 2 else 0] = 1.0
         rows.fill(now_s=now, dt_s=0.2, goal_distance=5.0, goal_bearing=0.1 * k)
         rows.see([Seen(1, 1.0, 0.5)] if k > 1 else [])

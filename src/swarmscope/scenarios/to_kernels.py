@@ -65,7 +65,7 @@ def make_rigs_of(scenario: Scenario, moving: Moving) -> tuple[Rig, ...]:
 def _rig_of(scenario: Scenario, sheet: RobotModel, moving: Moving) -> Rig:
     """Return what a robot with this data sheet knows of itself, of the others and of what ``moving`` there is."""
     beams = make_beams(scenario.lidar.beams, math.radians(scenario.lidar.fov_deg), scenario.lidar.range_m)
-    noise = scenario.noise
+    range_sigma, position_sigma = sigmas_of(scenario)
     sensor = Sensor(
         beams=scenario.lidar.beams,
         angle_min=beams.angle_min,
@@ -73,14 +73,25 @@ def _rig_of(scenario: Scenario, sheet: RobotModel, moving: Moving) -> Rig:
         wraps=beams.wraps,
         range_min=scenario.lidar.range_min_m,
         range_max=scenario.lidar.range_m,
-        range_sigma=noise.range_fraction,
-        position_sigma=math.hypot(noise.range_fraction, math.radians(noise.bearing_deg)),
+        range_sigma=range_sigma,
+        position_sigma=position_sigma,
     )
-    body = body_of(sheet)
-    guard, safety = scenario.guard, scenario.safety
-    return _latest_rig(
-        body,
-        all_round(sensor),
+    return _latest_rig(all_round(sensor), *sheet_of(scenario, sheet, moving))
+
+
+def sigmas_of(scenario: Scenario) -> tuple[float, float]:
+    """Return the standard deviations of a range and of a neighbour's position, as fractions of the distance."""
+    noise = scenario.noise
+    return noise.range_fraction, math.hypot(noise.range_fraction, math.radians(noise.bearing_deg))
+
+
+def sheet_of(
+    scenario: Scenario, sheet: RobotModel | None = None, moving: Moving = STANDSTILL
+) -> tuple[Body, Guarding, Safety, Sharing]:
+    """Return the data sheet of a robot of the scenario, the largest one if none is named, but the LiDAR."""
+    guard, safety, noise = scenario.guard, scenario.safety, scenario.noise
+    return (
+        body_of(sheet or scenario.widest),
         Guarding(
             **guard.model_dump(exclude_none=True) | _about_others(scenario, moving),
             latency_s=noise.scan_age_s,
@@ -113,7 +124,7 @@ def _about_others(scenario: Scenario, moving: Moving) -> dict[str, float]:
 
 
 @lru_cache(maxsize=8)
-def _latest_rig(body: Body, sensor: Sensor, guarding: Guarding, safety: Safety, sharing: Sharing) -> Rig:
+def _latest_rig(sensor: Sensor, body: Body, guarding: Guarding, safety: Safety, sharing: Sharing) -> Rig:
     """Return the rig of this data sheet; those of the last ones asked for, whose tables take long, are kept."""
     return make_rig(body, sensor, guarding, safety, sharing)
 

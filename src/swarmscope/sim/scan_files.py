@@ -1,15 +1,16 @@
-"""Recorded scans from files: ``.npz`` (two layouts) and text.
+"""Recorded scans from files: ``.npz``, text, ROS bags.
 
-======================  =============================================================================
-``.npz``, centimetres   ``ranges_cm`` (K, M) unsigned integers, 65535 = no return
-``.npz``, metres        ``ranges_m`` (K, M) floats
-both                    ``angle_min``, ``angle_increment`` [rad], ``range_min``, ``range_max`` [m];
-                        optional ``stamp_s`` (K,), ``odom_xy_yaw`` (K, 3) [m, m, rad]
-``.csv``, ``.txt``      first ``# angle_min=... angle_increment=... range_min=... range_max=...`` (other fields of a
-                        LaserScan may stand there), then one scan per line, metres, ``inf`` and ``nan`` allowed,
-                        separated by commas, semicolons or spaces; or a LaserScan table as ROS tools export it
-``.log``, ``.clf``      CARMEN: ``FLASER`` or ``ROBOTLASER1``
-======================  =============================================================================
+========================  ===========================================================================================
+``.npz``                  ``ranges_m`` (K, M) floats, or ``ranges_cm``, ``ranges_mm`` unsigned integers, 65535 = no
+                          return; ``angle_min``, ``angle_increment`` [rad], ``range_min``, ``range_max`` [m]; optional
+                          ``stamp_s`` (K,), ``odom_xy_yaw`` (K, 3) [m, m, rad], ``time_increment`` [s]
+``.csv``, ``.txt``        first ``# angle_min=... angle_increment=... range_min=... range_max=...`` (other fields of a
+                          LaserScan may stand there), then one scan per line, metres, ``inf`` and ``nan`` allowed,
+                          separated by commas, semicolons or spaces; or a LaserScan table as ROS tools export it
+``.log``, ``.clf``        CARMEN: ``FLASER`` or ``ROBOTLASER1``
+folder, ``.db3``,         rosbag2, MCAP, ROS 1 (``scan_bags``)
+``.mcap``, ``.bag``
+========================  ===========================================================================================
 
 As in REP-117, ``+inf`` is no return, NaN an invalid reading and ``-inf`` an object too close to measure. Beams may run
 clockwise (a negative increment), and scans may be shorter than others: readings that are missing are NaN.
@@ -19,7 +20,7 @@ from __future__ import annotations
 
 import math
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -27,15 +28,32 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from swarmscope.errors import InputFileError, UnknownNameError
-from swarmscope.sim.scan_tables import HEADER_KEYS, BadFile, arrays_from_text
+from swarmscope.errors import ConfigError, InputFileError, UnknownNameError
+from swarmscope.onboard.lidar import LONGEST_M
+from swarmscope.onboard.readings import MILLI, are_millimetres
+from swarmscope.sim.scan_bags import SUFFIXES as BAG_SUFFIXES
+from swarmscope.sim.scan_bags import is_bag, read_bag
+from swarmscope.sim.scan_read import HEADER_KEYS, Arrays, Ask, BadFile, Read
+from swarmscope.sim.scan_tables import read_text_scans
 from swarmscope.texts import check_regular, read_text
 
 MAX_BYTES = 1 << 30
-NO_RETURN_CM = 65535
+TEXT_BYTES = 1 << 28
+NO_RETURN = 65535
+UNITS = {"ranges_m": 1.0, "ranges_cm": 100.0, "ranges_mm": 1000.0}
+"""How many of them are a metre."""
+PER_SCAN = (*UNITS, "stamp_s", "odom_xy_yaw")
+FARTHEST_M = 100.0
+"""Hardly a 2D LiDAR sees farther."""
+FINEST_RAD = 1e-4
+"""Readings are farther apart: half a turn has so many places in tables of int16."""
+MOST_TURNS = 100.0
+"""No direction is larger [rad]."""
+NO_HEADER = "say it with --fov DEGREES, or in a line '# angle_min=.. angle_increment=.. range_min=.. range_max=..'"
+REMEDIES = dict.fromkeys((".gz", ".zip", ".bz2", ".xz", ".7z", ".zst"), "; unpack it first")
+REMEDIES |= dict.fromkeys((".xlsx", ".xls", ".ods"), "; save it as CSV")
 LARGEST_FIELD = 2.0 * math.pi * 1.02
 """Readings cover no more than this [rad]; some LiDARs give a beam or two twice."""
-MILLI, MOST = 1000.0, 0.9
 SCAN_FOLDER = Path(__file__).parent.parent / "data" / "scans"
 
 
@@ -45,8 +63,8 @@ class ScanLog:
 
     name: str
     ranges_m: npt.NDArray[np.float32]
-    """(K, M) [m] as in the file; ``+inf`` = no return or beyond ``range_max``, NaN = invalid, 0 = too close to measure;
-    negative ones are as they were."""
+    """(K, M) [m] as in the file; ``+inf`` = no return or beyond ``range_max``, NaN and negative = invalid, ``-inf`` and
+    what is below ``range_min`` = too close to measure."""
     stamp_s: npt.NDArray[np.float64]
     """(K,) [s], never falling; NaN where the file does not say."""
     angle_min: float
@@ -56,6 +74,12 @@ class ScanLog:
     range_max: float
     odom: npt.NDArray[np.float64] | None
     """(K, 3) x [m], y [m], yaw [rad] by odometry, or None."""
+    time_increment: float = 0.0
+    """From one reading to the next [s]; ``stamp_s`` is the first one's."""
+    unit_m: float = 1.0
+    """What 1 in the file is [m]."""
+    geometry: npt.NDArray[np.float64] | None = None
+    """(K, 2) ``angle_min`` and ``increment`` of each scan; None: all are alike."""
     lengths: npt.NDArray[np.int64] | None = None
     """(K,) readings of each scan, the first ones; None: M."""
     notes: tuple[str, ...] = ()
@@ -65,7 +89,7 @@ class ScanLog:
 def scan_file(name: str) -> Path:
     """Return the scan file called ``name``: a path, or scans that come with the package."""
     path = Path(name)
-    if path.suffix or len(path.parts) > 1:
+    if path.suffix or len(path.parts) > 1 or path.is_dir():
         return path
     packaged = {file.stem: file for file in SCAN_FOLDER.glob("*.npz")}
     if name not in packaged:
@@ -73,17 +97,33 @@ def scan_file(name: str) -> Path:
     return packaged[name]
 
 
-def load_scans(path: str | Path) -> ScanLog:
+def load_scans(path: str | Path, ask: Ask = Ask()) -> ScanLog:  # noqa: B008  a tuple
     """Read recorded scans; any file that is not sound raises ``InputFileError`` with the reason."""
     path = Path(path)
-    readers = {".npz": _arrays_from_npz} | dict.fromkeys((".csv", ".txt", ".log", ".clf"), _arrays_from_table)
-    reader = readers.get(path.suffix.lower())
-    if reader is None:
-        raise InputFileError(path, f"scans come as {', '.join(readers)}, not '{path.suffix}'")
+    if ask.every < 1:
+        raise ConfigError("--every", f"must be at least 1, not {ask.every}")
+    if ask.fov_deg is not None and not 0.0 < ask.fov_deg <= 360.0:
+        raise ConfigError("--fov", f"must be above 0 and at most 360 degrees, not {ask.fov_deg:g}")
+    if ask.first_deg is not None and not math.isfinite(ask.first_deg):
+        raise ConfigError("--first", f"must be a finite number of degrees, not {ask.first_deg:g}")
     try:
-        return _checked_log(path.stem, reader(path))
+        return _checked_log(path.stem, _reader_of(path)(path, ask), ask)
     except BadFile as error:
         raise InputFileError(path, str(error)) from None
+
+
+def _reader_of(path: Path) -> Callable[[Path, Ask], Read]:
+    """Return what reads this kind of file; raises BadFile."""
+    kind = path.suffix.lower()
+    readers = {".npz": _read_npz} | dict.fromkeys((".csv", ".tsv", ".txt", ".log", ".clf"), _read_table)
+    if is_bag(path):
+        return read_bag
+    if kind in readers:
+        return readers[kind]
+    remedy = REMEDIES.get(kind, "")
+    if path.is_dir():
+        raise BadFile("is a folder, and no rosbag2: it has no metadata.yaml")
+    raise BadFile(f"scans come as {', '.join((*readers, *BAG_SUFFIXES))}, not '{path.suffix}'{remedy}")
 
 
 def read_npz(path: Path) -> dict[str, npt.NDArray[Any]]:
@@ -121,32 +161,45 @@ def _first_line(error: Exception) -> str:
     return (str(error).splitlines() or [type(error).__name__])[0]
 
 
-def _arrays_from_table(path: Path) -> dict[str, npt.NDArray[Any]]:
-    text = read_text(path, MAX_BYTES)
+def _read_npz(path: Path, ask: Ask) -> Read:
+    arrays = _arrays_from_npz(path)
+    scans = {len(value) for key, value in arrays.items() if key in PER_SCAN and value.ndim > 0}
+    if ask.every > 1 and len(scans) == 1:
+        arrays |= {key: arrays[key][:: ask.every] for key in PER_SCAN if key in arrays and arrays[key].ndim > 0}
+    return Read({key: value for key, value in arrays.items() if key not in ("lengths", "geometry")})
+
+
+def _read_table(path: Path, ask: Ask) -> Read:
+    text = read_text(path, TEXT_BYTES)
     if not text:
         raise BadFile("is empty")
     if not text.endswith("\n"):
         raise BadFile("the last line is not ended: torn (if it is complete, end it with a newline)")
-    return arrays_from_text(text)
+    return read_text_scans(text, ask)
 
 
-def _checked_log(name: str, arrays: Mapping[str, npt.NDArray[Any]]) -> ScanLog:
+def _checked_log(name: str, read: Read, ask: Ask) -> ScanLog:
+    arrays, notes = dict(read.arrays), list(read.notes)
+    raw, unit_m = _raw_ranges(arrays)
+    scans, beams = raw.shape
+    if ask.fov_deg is not None:
+        arrays = _with_field(arrays, beams, ask)
+    elif ask.first_deg is not None:
+        raise ConfigError("--first", "says where readings begin whose --fov is given")
+    elif not set(HEADER_KEYS) & set(arrays):
+        raise BadFile(f"has no 'angle_min': where do its {beams} readings look? {NO_HEADER}")
     angle_min, increment, range_min, range_max = (_scalar(arrays, key) for key in HEADER_KEYS)
+    range_max = min(range_max, LONGEST_M)
     if not 0.0 <= range_min < range_max:
         raise BadFile(f"range_min {range_min:g} and range_max {range_max:g} are not 0 <= min < max")
-    raw = _raw_ranges(arrays)
-    scans, beams = raw.shape
-    notes = []
-    if abs(increment) * (beams - 1) > LARGEST_FIELD and math.radians(abs(increment)) * (beams - 1) <= LARGEST_FIELD:
-        notes.append(f"angle_increment {increment:g} is more than a turn in radians: angles are read as degrees")
-        angle_min, increment = math.radians(angle_min), math.radians(increment)
-    if increment == 0.0:
-        raise BadFile("angle_increment is 0")
-    if (beams - 1) * abs(increment) > LARGEST_FIELD:
-        raise BadFile(f"{beams} beams of {increment:g} rad are more than one turn")
-    if _are_millimetres(raw, range_min, range_max):
+    geometry = arrays.get("geometry", np.array([[angle_min, increment]]))
+    geometry, said = in_radians(geometry, beams)
+    notes += said
+    for first, step in np.unique(geometry, axis=0).tolist():
+        _check_rays(first, step, beams)
+    if are_millimetres(raw, range_min, range_max):
         notes.append(f"readings lie beyond range_max {range_max:g} m: they are read as millimetres")
-        raw = raw / MILLI
+        raw, unit_m = raw / MILLI, unit_m / MILLI
     ranges = _checked_ranges(raw, range_max)
     stamps = _optional(arrays, "stamp_s", (scans,))
     if stamps is not None and np.any(np.diff(stamps) < 0.0):
@@ -155,56 +208,90 @@ def _checked_log(name: str, arrays: Mapping[str, npt.NDArray[Any]]) -> ScanLog:
         name=name,
         ranges_m=ranges,
         stamp_s=np.full(scans, np.nan) if stamps is None else stamps,
-        angle_min=angle_min,
-        increment=increment,
+        angle_min=float(geometry[0, 0]),
+        increment=float(geometry[0, 1]),
         range_min=range_min,
         range_max=range_max,
         odom=_optional(arrays, "odom_xy_yaw", (scans, 3)),
+        time_increment=_scalar(arrays, "time_increment") if "time_increment" in arrays else 0.0,
+        unit_m=unit_m,
+        geometry=geometry if len(geometry) == scans > 1 else None,
         lengths=arrays.get("lengths"),
         notes=tuple(notes),
     )
 
 
-def _are_millimetres(raw: npt.NDArray[np.float64], range_min: float, range_max: float) -> bool:
-    """Tell whether nearly all readings are far beyond the longest range, and within it as millimetres."""
-    readings = raw[np.isfinite(raw) & (raw > 0.0)]
-    if readings.size == 0 or np.mean(readings > range_max) < MOST:
-        return False
-    within = (readings / MILLI >= range_min) & (readings / MILLI <= range_max)
-    return bool(np.mean(within) >= MOST)
+def _with_field(arrays: Arrays, beams: int, ask: Ask) -> Arrays:
+    """Return the arrays with the directions that the user says; readings lie within 100 m if nobody says how far."""
+    assert ask.fov_deg is not None  # noqa: S101
+    step = ask.fov_deg / (beams if ask.fov_deg >= 360.0 else max(1, beams - 1))
+    first = -0.5 * ask.fov_deg if ask.first_deg is None else ask.first_deg
+    told = {"angle_min": np.radians(first), "angle_increment": np.radians(step)}
+    rest = {key: value for key, value in arrays.items() if key != "geometry"}
+    return {"range_min": np.array(0.0), "range_max": np.array(FARTHEST_M)} | rest | told
+
+
+def in_radians(geometry: npt.NDArray[np.float64], beams: int) -> tuple[npt.NDArray[np.float64], list[str]]:
+    """Return first directions and increments (K, 2) in radians, and what was said in degrees."""
+    first, step = (float(value) for value in geometry[0])
+    field = abs(step) * (beams - 1)
+    degrees = abs(step) > 0.0 and math.radians(field) <= LARGEST_FIELD
+    if field > LARGEST_FIELD and degrees:
+        return np.radians(geometry), [
+            f"angle_increment {step:g} is more than a turn in radians: angles are read as degrees"
+        ]
+    if abs(first) > LARGEST_FIELD and abs(math.radians(first)) <= LARGEST_FIELD:
+        return np.column_stack([np.radians(geometry[:, 0]), geometry[:, 1]]), [
+            f"angle_min {first:g} is more than a turn in radians: it is read as degrees, angle_increment as radians"
+        ]
+    return geometry, []
+
+
+def _check_rays(first: float, step: float, beams: int) -> None:
+    if step == 0.0:
+        raise BadFile("angle_increment is 0")
+    if abs(step) < FINEST_RAD:
+        raise BadFile(f"angle_increment {step:g}: readings lie too close together")
+    if (beams - 1) * abs(step) > LARGEST_FIELD:
+        raise BadFile(f"{beams} beams of {step:g} rad are more than one turn")
+    if abs(first) > MOST_TURNS:
+        raise BadFile(f"angle_min {first:g} is no direction")
 
 
 def _scalar(arrays: Mapping[str, npt.NDArray[Any]], key: str) -> float:
     if key not in arrays:
-        raise BadFile(f"has no '{key}'")
-    value = arrays[key]
-    if value.size != 1 or value.dtype.kind not in "iuf" or not np.isfinite(value).all():
+        raise BadFile(f"has no '{key}'; {NO_HEADER}")
+    value = np.asarray(arrays[key])
+    if value.size != 1 or value.dtype.kind not in "iuf":
         raise BadFile(f"'{key}' is not one finite number")
-    return float(value.reshape(()))
+    number = float(value.reshape(()))
+    if not (math.isfinite(number) or (key == "range_max" and number == math.inf)):
+        raise BadFile(f"'{key}' is not one finite number")
+    return number
 
 
-def _raw_ranges(arrays: Mapping[str, npt.NDArray[Any]]) -> npt.NDArray[np.float64]:
-    """Return the readings as float64 metres, ``+inf`` where there was no return."""
-    present = [key for key in ("ranges_cm", "ranges_m") if key in arrays]
+def _raw_ranges(arrays: Mapping[str, npt.NDArray[Any]]) -> tuple[npt.NDArray[np.float64], float]:
+    """Return the readings as float64 metres, ``+inf`` where there was no return, and what 1 is in the file [m]."""
+    present = [key for key in UNITS if key in arrays]
     if len(present) != 1:
-        raise BadFile("needs exactly one of 'ranges_cm' and 'ranges_m'")
-    raw = arrays[present[0]]
+        raise BadFile(f"needs exactly one of {', '.join(UNITS)}")
+    key, raw = present[0], arrays[present[0]]
     if raw.ndim != 2 or raw.size == 0:
-        raise BadFile(f"'{present[0]}' has shape {raw.shape}; it must be (scans, beams), both at least 1")
-    if present[0] == "ranges_m":
+        raise BadFile(f"'{key}' has shape {raw.shape}; it must be (scans, beams), both at least 1")
+    if key == "ranges_m":
         if raw.dtype.kind != "f":
-            raise BadFile(f"'ranges_m' holds {raw.dtype}; it must hold floats")
-        return raw.astype(np.float64)
+            raise BadFile(f"'ranges_m' holds {raw.dtype}; it must hold floats (whole millimetres are 'ranges_mm')")
+        return raw.astype(np.float64), 1.0
     if raw.dtype.kind != "u":
-        raise BadFile(f"'ranges_cm' holds {raw.dtype}; it must hold unsigned integers")
-    return np.where(raw == NO_RETURN_CM, np.inf, raw / 100.0)
+        raise BadFile(f"'{key}' holds {raw.dtype}; it must hold unsigned integers")
+    return np.where(raw == NO_RETURN, np.inf, raw / UNITS[key]), 1.0 / UNITS[key]
 
 
 def _checked_ranges(raw: npt.NDArray[np.float64], range_max: float) -> npt.NDArray[np.float32]:
     if np.isnan(raw).all():
         raise BadFile("holds no valid reading, only NaN")
     beyond = raw > range_max * (1.0 + 1e-6)
-    return np.where(beyond, np.inf, np.where(raw == -np.inf, 0.0, raw)).astype(np.float32)
+    return np.where(beyond, np.inf, raw).astype(np.float32)
 
 
 def _optional(

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from helpers import beams_of, circles_world, make_sensor, rig_of, scan_at
-from swarmscope.onboard.lidar import Rays
+from swarmscope.onboard.perception.rays import Rays
 from swarmscope.onboard.perception.reproject import Grid, Seat, reproject, settle
 from swarmscope.sim.lidar import cast_static, make_beams
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.geometry import ray_segment, wrap_angle
-from swarmscope.onboard.lidar import Rays
+from swarmscope.onboard.perception.rays import Rays
 from swarmscope.onboard.view import View
 
 ON_BORDER = math.pi - 0.01

@@ -1,0 +1,124 @@
+"""Scans seen from elsewhere than where they were taken, from one place or from many: the steps before the kernels.
+
+Holes are bridged by the rule for holes (``mend``) before anything is moved: what no body fits into hides none from
+anywhere. A robot that turns against its beams has not seen all round when a scan ends; that is a hole, too.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from swarmscope.geometry import TWO_PI, Pose
+from swarmscope.onboard.lidar import Layout
+from swarmscope.onboard.perception.mend import body_and_clearance, mend
+from swarmscope.onboard.perception.reproject import Grid, Seat, reproject
+from swarmscope.onboard.perception.straighten import straighten
+from swarmscope.onboard.rig import Rig
+from swarmscope.onboard.sensor import Sensor
+from swarmscope.onboard.trail import then
+
+Mount = tuple[float, float, float]
+BRIDGED = 1.001
+"""A hole that is filled farther away than so many times what touches the body is one that was bridged."""
+
+
+class Taken(NamedTuple):
+    """A scan and the sensor that took it."""
+
+    scan: np.ndarray
+    """(B,) [m] along the rays of ``layout``."""
+    layout: Layout
+    mount: Mount
+    least_m: float
+    """Nearer things the sensor does not measure."""
+
+
+def from_one_place(taken: Taken, back: Pose, rig: Rig, wanted: Grid) -> np.ndarray:
+    """Return a scan, taken when the body was at ``back``, as seen from where it is now, along ``wanted``."""
+    scan, layout, mount, _ = taken
+    x, y, _ = then(back, (*mount[:2], 0.0))
+    out = np.empty(wanted.cos.size, np.float32)
+    seat = Seat(x, y, back[2], back[0], back[1], _core(rig))
+    reproject(bridged(scan, layout, rig, _blind_m(taken)), layout.rays, seat, wanted, out)
+    return out
+
+
+def from_many_places(taken: Taken, back: np.ndarray, rig: Rig, wanted: Grid) -> np.ndarray:
+    """Return the same of a scan whose ray n was taken when the body was at ``back[n]`` (B, 3)."""
+    scan, layout, mount, _ = taken
+    rays = layout.rays
+    angles = rays.start + rays.increment * np.arange(scan.size) + back[:, 2]
+    scan, angles, back = _with_gap(scan, layout, angles, back)
+    c, s = np.cos(back[:, 2]), np.sin(back[:, 2])
+    x, y = back[:, 0] + c * mount[0] - s * mount[1], back[:, 1] + s * mount[0] + c * mount[1]
+    turned = angles - rays.start - rays.increment * np.arange(scan.size)
+    out = np.empty(wanted.cos.size, np.float32)
+    seats = np.column_stack([x, y, turned, back[:, 0], back[:, 1]])
+    straighten(bridged(scan, layout, rig, _blind_m(taken)), rays, seats, _core(rig), wanted, out)
+    return out
+
+
+def _blind_m(taken: Taken) -> float:
+    """Return how far from the body's centre something may be that is too near to be measured [m]."""
+    return taken.least_m + math.hypot(taken.mount[0], taken.mount[1])
+
+
+def bridged(scan: np.ndarray, layout: Layout, rig: Rig, blind_m: float) -> np.ndarray:
+    """Return ``scan (M,)`` with the holes bridged that no body fits into; wider ones stay broken."""
+    holes = np.isnan(scan)
+    if not holes.any():
+        return scan
+    whole = mended(scan, layout, rig, blind_m)
+    return np.where(holes & is_bridged(whole, rig), whole, scan)
+
+
+def mended(scan: np.ndarray, layout: Layout, rig: Rig, blind_m: float) -> np.ndarray:
+    """Return ``scan (M,)`` along the rays of ``layout`` as ``mend`` leaves it."""
+    rays, sensor = layout.rays, rig.sensor
+    whole, broken = scan.copy(), np.empty(scan.size, np.uint8)
+    told = Sensor(
+        beams=scan.size,
+        angle_min=rays.start,
+        increment=rays.increment,
+        wraps=rays.closed,
+        range_min=max(sensor.range_min, blind_m),
+        range_max=sensor.range_max,
+        range_sigma=sensor.range_sigma,
+        position_sigma=sensor.position_sigma,
+    )
+    mend(whole, rig._replace(sensor=told), broken)
+    return whole
+
+
+def is_bridged(whole: np.ndarray, rig: Rig) -> np.ndarray:
+    """Return which holes (M,) were bridged, and do not block."""
+    return np.asarray(whole > np.float32(BRIDGED * body_and_clearance(rig)))
+
+
+def _core(rig: Rig) -> float:
+    """Return what is the robot itself [m]."""
+    return rig.body.radius_m + rig.guarding.clearance_m
+
+
+def _with_gap(
+    scan: np.ndarray, layout: Layout, angles: np.ndarray, back: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return scan, directions and places with broken rays where a circle has come apart because the robot turned."""
+    if not layout.rays.closed:
+        return scan, angles, back
+    jumps = np.flatnonzero(np.abs(np.diff(layout.order)) > 1)  # there the first reading is beside the last
+    at = int(jumps[0]) + 1 if jumps.size else scan.size
+    gap = angles[at % scan.size] - angles[at - 1] + (0.0 if jumps.size else TWO_PI)
+    missing = round(gap / layout.rays.increment) - 1
+    if missing < 1:
+        return scan, angles, back
+    part = np.arange(1, missing + 1) / (missing + 1)
+    between = back[at - 1] + part[:, None] * (back[at % scan.size] - back[at - 1])
+    return (
+        np.insert(scan, at, np.full(missing, np.nan, np.float32)),
+        np.insert(angles, at, angles[at - 1] + part * gap),
+        np.insert(back, np.full(missing, at), between, axis=0),
+    )
