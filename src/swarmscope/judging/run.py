@@ -269,6 +269,8 @@ def trajectory(outcome: Outcome) -> dict[str, np.ndarray]:
         "arrival_s": trace.robots["arrival_s"].copy(),
         "collided": trace.robots["crashed"].copy(),
         "range_max_m": np.array(beams.range_max),
+        **({"disc_xy_m": trace.discs} if trace.discs.size else {}),
+        **({"door_closed": trace.doors} if trace.doors.size else {}),
     }
 
 

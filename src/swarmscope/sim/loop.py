@@ -24,7 +24,7 @@ from swarmscope.sim.cells import index_robots
 from swarmscope.sim.faults import blanks, forget, strike
 from swarmscope.sim.lidar import Beams
 from swarmscope.sim.motion import judge, move
-from swarmscope.sim.moving import STANDSTILL, Moving
+from swarmscope.sim.moving import STANDSTILL, Moving, write_places
 from swarmscope.sim.radio import exchange
 from swarmscope.sim.sensing import sense
 from swarmscope.sim.state import (
@@ -90,6 +90,10 @@ class Trace:
     robots: np.ndarray
     shared: np.ndarray
     links: np.ndarray
+    discs: np.ndarray
+    """(T, D, 2) where discs on their ways were [m]."""
+    doors: np.ndarray
+    """(T, K) 1 where a door was closed."""
     choices: np.ndarray
     """Every choice of a side, a row of ``CHOICE`` each."""
     plan_us: np.ndarray
@@ -210,6 +214,7 @@ def run(
     chunks: list[Records] = []
     pool = _Pool(n, setting.threads)
     plan_us: list[float] = []
+    went = _Went(sim)
     sample_every = max(1, ticks // PLAN_SAMPLES)
     index_robots(sim)
     step_all(0, 0)  # loads the kernels, so that no step's time contains that
@@ -220,6 +225,7 @@ def run(
         row = tick % CHUNK
         if row == 0:
             chunks.append(new_records(min(CHUNK, ticks - tick), n, beams))
+        went.note(tick)
         if sensed is not None:
             sensed(held, tick)
         _tell(setting, sim, memory)
@@ -252,6 +258,8 @@ def run(
         robots=sim.robots,
         shared=swarm.shared,
         links=sim.links[: sim.links_n[0]].copy(),
+        discs=np.array(went.discs).reshape(tick, -1, 2),
+        doors=np.array(went.doors, np.uint8).reshape(tick, -1),
         choices=sim.choices[: sim.choices_n[0]].copy(),
         plan_us=np.array(plan_us),
         wall_s=wall_s,
@@ -281,6 +289,24 @@ def _stepper(setting: Setting, swarm: Swarm, memory: np.ndarray) -> Callable[[in
                 setting.planner.step_all(begin, end, held, memory, setting.params)
 
     return step_all
+
+
+class _Went:
+    """Keeps where what moves by itself has been."""
+
+    def __init__(self, sim: Sim) -> None:
+        self._moving, self._dt = sim.moving, sim.clock.dt
+        self._place = np.zeros((len(sim.moving.radius), 2))
+        self.discs: list[np.ndarray] = []
+        self.doors: list[np.ndarray] = []
+
+    def note(self, tick: int) -> None:
+        """Keep it for a tick."""
+        if len(self._place):
+            write_places(self._moving, tick * self._dt, self._place)
+            self.discs.append(self._place.copy())
+        if len(self._moving.closed):
+            self.doors.append(self._moving.closed.copy())
 
 
 def _tell(setting: Setting, sim: Sim, memory: np.ndarray) -> None:

@@ -68,20 +68,20 @@ def _legs(disc: Circle) -> tuple[Floats, float]:
     """Return the legs of a disc (L, 5), and after how long it begins anew [s], 0 for never."""
     if disc.velocity is not None:
         return np.array([[0.0, *disc.center, *disc.velocity]]), 0.0
-    points = [disc.center, *(disc.way or [])]
+    points, repeat = [disc.center, *(disc.way or [])], disc.repeat or "back"
     times = _times(disc)
-    if disc.repeat == "loop" and disc.times_s is None:
+    if repeat == "loop" and disc.times_s is None:
         points, times = [*points, disc.center], [*times, times[-1] + math.dist(points[-1], disc.center) / _speed(disc)]
-    if disc.repeat == "back":
+    if repeat == "back":
         points, times = points + points[-2::-1], times + [2.0 * times[-1] - t for t in times[-2::-1]]
     legs = [
         [t, *a, (b[0] - a[0]) / (u - t), (b[1] - a[1]) / (u - t)]
         for (t, u), (a, b) in zip(pairwise(times), pairwise(points), strict=True)
         if u > t
     ]
-    if disc.repeat == "once":
+    if repeat == "once":
         legs.append([times[-1], *points[-1], 0.0, 0.0])
-    return np.array(legs), 0.0 if disc.repeat == "once" else times[-1]
+    return np.array(legs), 0.0 if repeat == "once" else times[-1]
 
 
 def _times(disc: Circle) -> list[float]:
@@ -116,6 +116,13 @@ def disc_at(moving: Moving, d: int, t: float) -> tuple[float, float]:
             high = middle - 1
     leg = moving.legs[low]
     return leg[1] + leg[3] * (t - leg[0]), leg[2] + leg[4] * (t - leg[0])
+
+
+@jit
+def write_places(moving: Moving, t: float, out: Floats) -> None:
+    """Write where each disc is at time t [s] into ``out (D, 2)`` [m]."""
+    for d in range(len(out)):
+        out[d, 0], out[d, 1] = disc_at(moving, d, t)
 
 
 @jit_inline

@@ -382,6 +382,8 @@ def _check_motion(disc: Circle) -> None:
     times = [0.0, *disc.times_s]
     if len(times) != len(points):
         raise ValueError(f"{len(disc.times_s)} times_s for {len(disc.way)} points of the way")
+    if disc.repeat == "loop" and points[-1] != points[0]:
+        raise ValueError("with times_s the way of a loop ends at its center")
     for index, ((a, b), (t, u)) in enumerate(zip(pairwise(points), pairwise(times), strict=True)):
         if not t < u or math.dist(a, b) > FASTEST_MPS * (u - t):
             raise ValueError(f"times_s {index}: {u:g} s is too early")

@@ -8,6 +8,7 @@ import numpy.typing as npt
 INK, FAINT, GROUND = "#2b333b", "#7b8590", "#fbfaf7"
 SOLID, SOLID_EDGE = "#c9d2c4", "#a4b19d"
 WALL = "#8c9a86"
+MOVER = "#d9b48f"
 CRASH = "#c23b22"
 SAFE = "#0f8a6a"
 PACKET = "#3d8f7d"

@@ -9,8 +9,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from swarmscope.sim.world import Circle, Grid, Obstacle, Polygon, Wall
-from swarmscope.viewing.colours import CRASH, FAINT, GROUND, INK, PACKET, SOLID, SOLID_EDGE, WALL, robot_colours
+from swarmscope.sim.world import Circle, Door, Grid, Obstacle, Polygon, Wall
+from swarmscope.viewing.colours import (
+    CRASH,
+    FAINT,
+    GROUND,
+    INK,
+    MOVER,
+    PACKET,
+    SOLID,
+    SOLID_EDGE,
+    WALL,
+    robot_colours,
+)
 from swarmscope.viewing.run_data import (
     RunData,
     crash_ticks,
@@ -33,6 +44,7 @@ CLOSE_RADII = 10.0
 PACKET_OPACITY, FEW_PACKETS = 0.55, 150
 """Of the line that stands for a packet; up to so many are drawn alike."""
 
+WAY: dict[str, Any] = {"color": MOVER, "lw": 1.0, "ls": (0, (4, 3)), "zorder": 1}
 MOST_NUMBERS = 60
 """More robots have no numbers in the picture: one could not read them."""
 
@@ -102,7 +114,9 @@ def draw_obstacles(axes: Axes, obstacles: list[Obstacle]) -> None:
 
     solids: list[patches.Patch] = []
     for obstacle in obstacles:
-        if isinstance(obstacle, Circle):
+        if isinstance(obstacle, Circle) and obstacle.moves:
+            _draw_way(axes, obstacle)
+        elif isinstance(obstacle, Circle):
             solids.append(patches.Circle(obstacle.center, obstacle.radius))
         elif isinstance(obstacle, Polygon):
             solids.append(patches.Polygon(obstacle.points))
@@ -111,6 +125,24 @@ def draw_obstacles(axes: Axes, obstacles: list[Obstacle]) -> None:
     axes.add_collection(PatchCollection(solids, facecolor=SOLID, edgecolor=SOLID_EDGE, linewidth=0.8))
     walls = [obstacle.points for obstacle in obstacles if isinstance(obstacle, Wall)]
     axes.add_collection(LineCollection(walls, colors=WALL, linewidths=2.2, capstyle="round"))
+    doors = [obstacle.points for obstacle in obstacles if isinstance(obstacle, Door)]
+    axes.add_collection(LineCollection(doors, colors=WALL, linewidths=1.6, linestyles=(0, (2, 1.5))))
+
+
+def _draw_way(axes: Axes, disc: Circle) -> None:
+    """Draw a disc that moves where it begins, and its way."""
+    from matplotlib import patches
+
+    limits = axes.get_xlim(), axes.get_ylim()
+    if disc.velocity is not None:
+        (x, y), (vx, vy) = disc.center, disc.velocity
+        axes.axline(disc.center, (x + vx, y + vy), **WAY)
+    else:
+        points = [disc.center, *(disc.way or []), *([disc.center] if disc.repeat == "loop" else [])]
+        axes.plot(*np.transpose(points), **WAY)
+    axes.add_patch(patches.Circle(disc.center, disc.radius, fc=MOVER, ec=SOLID_EDGE, lw=0.8, alpha=0.55))
+    axes.set_xlim(*limits[0])
+    axes.set_ylim(*limits[1])
 
 
 def _draw_grid(axes: Axes, grid: Grid) -> None:

@@ -48,6 +48,8 @@ _TYPES = {
     "opinions": "<f4",
     "arrival_s": "<f4",
     "collided": "u1",
+    "disc_xy_m": "<f4",
+    "door_closed": "u1",
 }
 """How each array of the trajectory is stored in the page."""
 
@@ -82,7 +84,7 @@ def page_data(run: RunData) -> dict[str, Any]:
         "summary": summary_rows(run),
         "failures": failure_reasons(run),
         "robots": [robot.model_dump() for robot in run.world.robots],
-        "obstacles": [obstacle.model_dump() for obstacle in run.world.obstacles],
+        "obstacles": [obstacle.model_dump(exclude_none=True) for obstacle in run.world.obstacles],
         "bounds": shown_bounds(run.world),
         "wall_m": WALL_M,
         "state_names": [str(name) for name in trajectory.state_names],

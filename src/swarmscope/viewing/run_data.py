@@ -17,7 +17,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from swarmscope.errors import InputFileError, SwarmscopeError
 from swarmscope.judging.cases import CHOICE_COLUMNS, OPINION_COLUMNS
 from swarmscope.judging.run_folder import TRAJECTORY, WORLD, read_metrics, read_trajectory, read_world
-from swarmscope.sim.world import Grid, Length, Number, Obstacle, Point, grid_corners, solid_from_grid
+from swarmscope.sim.world import Circle, Door, Grid, Length, Number, Obstacle, Point, grid_corners, solid_from_grid
 
 Array = npt.NDArray[Any]
 
@@ -111,6 +111,10 @@ class Trajectory(NamedTuple):
     """(C, 6) ``CHOICE_COLUMNS`` of each choice of a side; runs of earlier versions have none."""
     opinions: Array = np.empty((0, len(OPINION_COLUMNS)))
     """(O, 5) ``OPINION_COLUMNS`` of each neighbour that took part in one."""
+    disc_xy_m: Array = np.empty((0, 0, 2))
+    """(T, D, 2) where the discs that move are, in the order of the world."""
+    door_closed: Array = np.empty((0, 0), np.uint8)
+    """(T, K) 1 where a door is closed, in the order of the world."""
 
 
 @dataclass(frozen=True)
@@ -135,6 +139,7 @@ _KINDS = {
     "safe_bits": "u",
     "links": "ui",
     "collided": "uib",
+    "door_closed": "ub",
 }
 """Kinds of numbers that an array may hold; those not listed hold real numbers."""
 
@@ -147,7 +152,18 @@ def load_run(run_dir: Path) -> RunData:
     metrics = read_metrics(folder)
     world = _checked_world(folder / WORLD, read_world(folder))
     trajectory = _checked_trajectory(folder / TRAJECTORY, read_trajectory(folder), len(world.robots))
+    _check_moving(folder / TRAJECTORY, world, trajectory)
     return RunData(folder, world, trajectory, metrics)
+
+
+def discs_of(world: WorldFile) -> list[Circle]:
+    """Return the discs that move."""
+    return [obstacle for obstacle in world.obstacles if isinstance(obstacle, Circle) and obstacle.moves]
+
+
+def doors_of(world: WorldFile) -> list[Door]:
+    """Return the doors."""
+    return [obstacle for obstacle in world.obstacles if isinstance(obstacle, Door)]
 
 
 def decision_ticks(trajectory: Trajectory, robot: int) -> Array:
@@ -214,6 +230,17 @@ def _checked_trajectory(path: Path, arrays: Mapping[str, Array], robots: int) ->
     if why:
         raise InputFileError(path, why)
     return trajectory
+
+
+def _check_moving(path: Path, world: WorldFile, trajectory: Trajectory) -> None:
+    """Raise an InputFileError unless what moves in the world has its places in the trajectory."""
+    ticks = trajectory.t_s.size
+    for name, count, tail in (("disc_xy_m", len(discs_of(world)), (2,)), ("door_closed", len(doors_of(world)), ())):
+        array = getattr(trajectory, name)
+        if count and array.shape != (ticks, count, *tail):
+            raise InputFileError(path, f"{name} has shape {array.shape}, expected {(ticks, count, *tail)}")
+        if not np.all(np.isfinite(array)):
+            raise InputFileError(path, f"{name} holds values that are not finite")
 
 
 def _first_fault(trajectory: Trajectory, robots: int) -> str:

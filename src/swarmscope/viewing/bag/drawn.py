@@ -24,8 +24,8 @@ from swarmscope.viewing.bag.ros import (
     nanoseconds,
     pose,
 )
-from swarmscope.viewing.colours import CRASH, INK, SOLID, WALL, robot_colours
-from swarmscope.viewing.run_data import RobotEntry, RunData, crash_ticks
+from swarmscope.viewing.colours import CRASH, INK, MOVER, SOLID, WALL, robot_colours
+from swarmscope.viewing.run_data import RobotEntry, RunData, crash_ticks, discs_of, doors_of
 
 TALL_M = 0.3
 """Height of what stands in the world."""
@@ -55,6 +55,8 @@ def obstacles(found: Sequence[Obstacle]) -> list[Any]:
     head, here, markers = header(0, MAP), pose(0.0, 0.0), []
     for n, obstacle in enumerate(found):
         name = Name("obstacles", n)
+        if isinstance(obstacle, Circle) and obstacle.moves:
+            continue
         if isinstance(obstacle, Circle):
             wide = 2.0 * obstacle.radius
             where = pose(*obstacle.center, 0.5 * TALL_M)
@@ -108,6 +110,20 @@ class Moving:
             markers.append(marker(ARROW, Name("headings", i), head, pose(0.0, 0.0, TALL_M), look))
             look, above = Look(_rgba(INK), (0.0, 0.0, 1.5 * r)), pose(0.0, 0.0, TALL_M + 1.5 * r)
             markers.append(marker(TEXT, Name("numbers", i), head, above, look, text=str(robot.id)))
+        return markers
+
+    def things(self, tick: int) -> list[Any]:
+        """Return the discs that move, and the doors that are closed or have just opened."""
+        trajectory, markers = self._run.trajectory, []
+        head, here = header(nanoseconds(float(trajectory.t_s[tick])), MAP), pose(0.0, 0.0)
+        for d, disc in enumerate(discs_of(self._run.world)):
+            x, y = trajectory.disc_xy_m[tick, d].tolist()
+            look = Look(_rgba(MOVER), (2.0 * disc.radius, 2.0 * disc.radius, TALL_M))
+            markers.append(marker(CYLINDER, Name("discs", d), head, pose(x, y, 0.5 * TALL_M), look))
+        for k, door in enumerate(doors_of(self._run.world)):
+            wide = WALL_M if trajectory.door_closed[tick, k] else 0.2 * WALL_M
+            line = [(x, y, 0.0) for x, y in door.points]
+            markers.append(marker(LINE_STRIP, Name("doors", k), head, here, Look(_rgba(WALL), (wide, 0.0, 0.0)), line))
         return markers
 
     def paths(self, tick: int) -> list[Any]:

@@ -77,6 +77,9 @@ def write_mcap(run: RunData, exact: Exact, path: Path, progress: Callable[[int, 
             if _is_due(run, tick) or tick == exact.ticks - 1 or not np.array_equal(crashed, before):
                 bag.put("/robots", MARKERS, array_of(moving.robots(tick)), t_ns)
                 bag.put("/paths", MARKERS, array_of(moving.paths(tick)), t_ns)
+            things = moving.things(tick)
+            if things:
+                bag.put("/moving", MARKERS, array_of(things), t_ns)
             packets = moving.packets(tick)
             if packets:
                 bag.put("/packets", MARKERS, array_of(packets), t_ns)

@@ -46,6 +46,20 @@ class Moments:
         turn = (of.yaw_rad[m] - of.yaw_rad[k] + np.pi) % TWO_PI - np.pi
         return Poses(x, y, of.yaw_rad[k] + turn * share)
 
+    def discs(self, t_s: float) -> Floats:
+        """Return (D, 2) where the discs that move are."""
+        k, of = self.tick(t_s), self._of
+        if not of.disc_xy_m.size:
+            return np.zeros((0, 2))
+        m = min(k + 1, of.t_s.size - 1)
+        share = (t_s - of.t_s[k]) / (of.t_s[m] - of.t_s[k]) if m > k else 0.0
+        places: Floats = of.disc_xy_m[k] + (of.disc_xy_m[m] - of.disc_xy_m[k]) * share
+        return places
+
+    def closed(self, t_s: float) -> Array:
+        """Return (K,) which doors are closed."""
+        return self._of.door_closed[self.tick(t_s)] if self._of.door_closed.size else np.zeros(0)
+
     def arrived(self, t_s: float) -> Array:
         """Return (N,) who has reached its goal; who does with the last tick has then."""
         return np.minimum(self._of.arrival_s, self.end_s) <= t_s + 1e-6  # NaN never is

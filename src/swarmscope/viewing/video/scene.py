@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from swarmscope.viewing.colours import CRASH, GROUND, INK, SAFE, robot_colours
+from swarmscope.viewing.colours import CRASH, GROUND, INK, MOVER, SAFE, WALL, robot_colours
 from swarmscope.viewing.pictures import MOST_NUMBERS, draw_frame, draw_obstacles, extent_of
-from swarmscope.viewing.run_data import RunData, headline
+from swarmscope.viewing.run_data import RunData, discs_of, doors_of, headline
 from swarmscope.viewing.video.moments import Moments, Poses
 
 Frame = npt.NDArray[np.uint8]
@@ -77,6 +77,13 @@ class Scene:
 
         n, wide = len(self._colours), 2.0 * self._radius
         self._fans = axes.add_collection(PolyCollection([], facecolor=SAFE, lw=0, alpha=0.13))
+        broad = [2.0 * disc.radius for disc in discs_of(self._run.world)]
+        self._discs = axes.add_collection(
+            EllipseCollection(
+                broad, broad, [0.0] * len(broad), units="xy", offset_transform=axes.transData, lw=0.8, facecolor=MOVER
+            )
+        )
+        self._doors = axes.add_collection(LineCollection([], colors=WALL, lw=2.2))
         (self._returns,) = axes.plot([], [], ls="none", marker="s", ms=1.1, mew=0, color=INK, alpha=0.55)
         self._paths = axes.add_collection(LineCollection([], colors=self._colours, lw=1.3, alpha=0.85))
         self._links = axes.add_collection(LineCollection([], lw=1.3))
@@ -88,7 +95,8 @@ class Scene:
         (self._crashes,) = axes.plot([], [], ls="none", marker="X", ms=11, mfc=CRASH, mec="white")
         self._numbers = [self._number(axes, i) for i in range(n)] if n <= MOST_NUMBERS else []
         self._words = figure.text(LEFT / figure.bbox.width, 12 / figure.bbox.height, "", fontsize=9.5, color=INK)
-        still = [self._fans, self._returns, self._paths, self._links, self._bodies, self._headings, self._crashes]
+        still = [self._discs, self._doors]
+        still += [self._fans, self._returns, self._paths, self._links, self._bodies, self._headings, self._crashes]
         self._moving = [*still, *self._numbers, self._words]
         for artist in self._moving:
             artist.set_animated(True)
@@ -105,6 +113,9 @@ class Scene:
         """Move everything to where it is at a moment."""
         moments, poses = self.moments, self.moments.poses(t_s)
         spots = np.column_stack([poses.x, poses.y])
+        self._discs.set_offsets(moments.discs(t_s))
+        doors = zip(doors_of(self._run.world), moments.closed(t_s), strict=True)
+        self._doors.set_segments([door.points for door, shut in doors if shut])
         if self._scans:
             self._fans.set_verts(moments.fans(t_s))
             self._returns.set_data(*moments.returns(t_s).T)
