@@ -190,3 +190,13 @@ SWEPT = {
 def test_what_a_sweep_has_found(name):
     untouched(SWEPT[name], arrive=False)
     untouched(SWEPT[name] | {"limit_s": 2.0 * SWEPT[name]["limit_s"]}, arrive=name != "slow scans")
+
+
+def test_a_command_that_is_heeded_at_once_is_judged_by_the_way_that_it_takes():
+    """Scans up to 0.1 s old: the guard shifted its ways ahead, and a robot that turned sharply grazed a tree."""
+    rng = np.random.default_rng([2, 5])
+    values = task("T3", 1, 2, planner={"name": "dh-bug"}, limit_s=60.0)
+    values["noise"] = {"range_fraction": 0.01, "scan_age_s": 0.1}
+    for seed in range(12):
+        sheet = {"v_max_mps": float(rng.uniform(0.8, 1.5)), "a_max_mps2": 1.2, "w_max_radps": 4.0}
+        untouched(values | {"seed": seed, "robot": sheet | {"radius_m": 0.29, "half_width_m": 0.29}}, arrive=False)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from pydantic import ValidationError
 
@@ -111,12 +111,20 @@ def _first_problem(error: ValidationError, where: str) -> ConfigError:
 
 def _valid_keys(loc: tuple[int | str, ...]) -> list[str]:
     """Return the keys that are valid at place ``loc`` of a scenario."""
-    model: Any = Scenario
+    models: list[Any] = [Scenario]
     for part in loc:
-        fields = getattr(model, "model_fields", {})
-        if part not in fields:
-            return []
-        kind = fields[part].annotation
-        options = [k for k in getattr(kind, "__args__", ()) if hasattr(k, "model_fields")]
-        model = options[0] if options else kind
-    return list(getattr(model, "model_fields", {}))
+        if isinstance(part, int):
+            continue
+        inside = [model.model_fields[part].annotation for model in models if part in model.model_fields]
+        if inside:
+            models = [model for annotation in inside for model in _models_in(annotation)]
+        else:  # what kind of obstacle it is
+            models = [model for model in models if getattr(model.model_fields.get("type"), "default", None) == part]
+    return list(dict.fromkeys(name for model in models for name in model.model_fields))
+
+
+def _models_in(annotation: Any) -> list[Any]:
+    """Return the groups of keys that a type is made of."""
+    if hasattr(annotation, "model_fields"):
+        return [annotation]
+    return [model for part in get_args(annotation) for model in _models_in(part)]

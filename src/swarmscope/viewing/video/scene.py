@@ -62,10 +62,10 @@ class Scene:
         draw_obstacles(axes, self._run.world.obstacles)
         axes.set_title(headline(self._run), loc="left", fontsize=10, color=INK, pad=7, fontweight="bold")
         self._colours = robot_colours(len(self._run.world.robots))
-        self._radius = max(max(r.radius for r in self._run.world.robots), LEAST_RADIUS_PX / scale)
-        self._radius_pt = self._radius * scale * 72 / DPI
+        self._radii = np.array([max(robot.radius, LEAST_RADIUS_PX / scale) for robot in self._run.world.robots])
+        self._radii_pt = self._radii * scale * 72 / DPI
         goals = np.array([robot.goal for robot in self._run.world.robots])
-        wide = (2.8 * self._radius_pt) ** 2
+        wide = (2.8 * self._radii_pt) ** 2
         axes.scatter(goals[:, 0], goals[:, 1], s=wide, facecolor="none", edgecolor=self._colours)
         self._make_moving(axes, figure)
         self._canvas.draw()
@@ -75,7 +75,7 @@ class Scene:
         """Make the artists that are drawn anew for every frame, in the order in which they cover one another."""
         from matplotlib.collections import EllipseCollection, LineCollection, PolyCollection
 
-        n, wide = len(self._colours), 2.0 * self._radius
+        n, wide = len(self._colours), 2.0 * self._radii
         self._fans = axes.add_collection(PolyCollection([], facecolor=SAFE, lw=0, alpha=0.13))
         broad = [2.0 * disc.radius for disc in discs_of(self._run.world)]
         self._discs = axes.add_collection(
@@ -88,7 +88,7 @@ class Scene:
         self._paths = axes.add_collection(LineCollection([], colors=self._colours, lw=1.3, alpha=0.85))
         self._links = axes.add_collection(LineCollection([], lw=1.3))
         self._bodies = axes.add_collection(
-            EllipseCollection([wide] * n, [wide] * n, [0.0] * n, units="xy", offset_transform=axes.transData, lw=1.4)
+            EllipseCollection(wide, wide, np.zeros(n), units="xy", offset_transform=axes.transData, lw=1.4)
         )
         self._bodies.set_edgecolor(self._colours)
         self._headings = axes.add_collection(LineCollection([], colors="white", lw=1.6))
@@ -106,7 +106,7 @@ class Scene:
 
         words = {"fontsize": 7, "color": self._colours[robot], "annotation_clip": False}
         words["path_effects"] = [withStroke(linewidth=2.0, foreground=GROUND)]
-        name, beside = str(self._run.world.robots[robot].id), 2.0 + 0.7 * self._radius_pt
+        name, beside = str(self._run.world.robots[robot].id), 2.0 + 0.7 * float(self._radii_pt[robot])
         return axes.annotate(name, (0, 0), xytext=(beside, beside), textcoords="offset points", **words)
 
     def _place(self, t_s: float) -> None:
@@ -138,7 +138,7 @@ class Scene:
     def _noses(self, poses: Poses) -> Any:
         """Return a line on each body that shows where it looks."""
         spots = np.column_stack([poses.x, poses.y])
-        ahead = self._radius * np.column_stack([np.cos(poses.yaw), np.sin(poses.yaw)])
+        ahead = self._radii[:, None] * np.column_stack([np.cos(poses.yaw), np.sin(poses.yaw)])
         return np.stack([spots + 0.1 * ahead, spots + 0.9 * ahead], axis=1)
 
     def _place_links(self, t_s: float, spots: Any) -> None:
