@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import NoReturn
-from xml.etree.ElementTree import Element, ParseError, TreeBuilder, XMLParser
+from xml.etree.ElementTree import Element, ParseError
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swarmscope.errors import InputFileError
+from swarmscope.sim.maps.gazebo import parse_xml
 
 MOST_BYTES = 32 << 20
 """Larger files are refused; the challenge's have half a megabyte."""
@@ -27,14 +27,6 @@ HARMLESS = {"model://sun", "model://ground_plane"}
 
 class _Bad(Exception):
     """Why a file is refused; carries the reason up to where the path is known."""
-
-
-class _Plain(TreeBuilder):
-    """Builds a tree and refuses document types: with them come entities, of which few bytes make gigabytes."""
-
-    def doctype(self, name: str, pubid: str | None, system: str | None) -> NoReturn:
-        """Refuse."""
-        raise _Bad(f"declares the document type '{name}', which no world file needs")
 
 
 def read_world_file(path: Path) -> NDArray[np.float64]:
@@ -54,9 +46,10 @@ def _tree(path: Path) -> Element:
         text = file.read(MOST_BYTES + 1)
     if len(text) > MOST_BYTES:
         raise _Bad(f"is larger than {MOST_BYTES >> 20} MiB")
-    parser = XMLParser(target=_Plain())  # noqa: S314  document types, and so entities, are refused
-    parser.feed(text)
-    return parser.close()
+    try:
+        return parse_xml(text.decode("utf-8", "replace"))
+    except ValueError as why:
+        raise _Bad(str(why)) from None
 
 
 def _discs(root: Element) -> NDArray[np.float64]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from swarmscope.errors import ConfigError
 from swarmscope.sim.maps import Trip, closed, load_map, load_movingai, load_trips, packaged_map
+from swarmscope.sim.maps.gazebo import load_world
 from swarmscope.sim.maps.map_server import YAML
 from swarmscope.sim.maps.movingai import place_of
 from swarmscope.sim.maps.orion import load_maze
@@ -61,7 +62,7 @@ def _made(scenario: Scenario) -> Setup:
 
 def _on_map(scenario: Scenario, place: MapModel) -> Setup:
     """Return the setup of robots on a map: starts and goals as given, the others drawn."""
-    grid, trips = _read_map(place)
+    world, grid, trips = _world_of_map(place)
     starts, goals = list(place.starts), list(place.goals)
     if place.trips is not None:
         if starts or goals:
@@ -69,12 +70,13 @@ def _on_map(scenario: Scenario, place: MapModel) -> Setup:
         trips = load_trips(Path(place.trips))
     if trips and not starts and not goals:
         trips = _some_trips(trips, place.first_trip, scenario.robots)
+        if grid is None:
+            raise ConfigError("map.trips", "trips count in cells, and this file holds none")
         starts = [place_of(trip.start, grid) for trip in trips]
         goals = [place_of(trip.goal, grid) for trip in trips]
     for key, given in (("starts", starts), ("goals", goals)):
         if len(given) > scenario.robots:
             raise ConfigError(f"map.{key}", f"{len(given)} are given for {scenario.robots} robots: raise 'robots'")
-    world = world_of(grid)
     if place.obstacles:
         world = WorldSpec(obstacles=[*world.obstacles, *place.obstacles], bounds=world.bounds)
     radii = scenario.radii_m
@@ -83,6 +85,17 @@ def _on_map(scenario: Scenario, place: MapModel) -> Setup:
         scenario.seed, scenario.robots, scenario.widest.radius_m, place.min_distance_m, starts, goals, each
     )
     return place_wanted(world, wanted)
+
+
+def _world_of_map(place: MapModel) -> tuple[WorldSpec, Grid | None, list[Trip]]:
+    """Return the world of a scenario's map, its cells if it has some, and the trips that its file holds."""
+    path = map_path(place.file)
+    if path.suffix.lower() == ".world":
+        if place.resolution_m is not None or place.number is not None:
+            raise ConfigError("map.resolution_m, map.number", f"{path} is a world of Gazebo: leave them out")
+        return load_world(path), None, []
+    grid, trips = _read_map(place)
+    return world_of(grid), grid, trips
 
 
 def _some_trips(trips: list[Trip], first: int, robots: int) -> list[Trip]:

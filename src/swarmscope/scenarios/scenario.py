@@ -259,7 +259,7 @@ class MapModel(_Strict):
 
     file: str
     """The map (looked for beside the scenario, too): map_server's YAML, a picture alone, a Moving AI .map, a .npz of
-    ORION's mazes, or the name of a packaged map."""
+    ORION's mazes, a .world of Gazebo with cylinders and boxes (DynaBARN's move), or the name of a packaged map."""
     resolution_m: Positive | None = None
     """Side of a cell, for files that do not say it: all but map_server's YAML [m]."""
     number: Annotated[int, Field(ge=0), NUMBER] | None = None
