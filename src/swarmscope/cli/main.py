@@ -191,6 +191,7 @@ def replay(
     open_: Annotated[bool, typer.Option("--open", help="Open the page in the browser.")] = False,
 ) -> None:
     """Make the replay page and the picture of a run folder anew."""
+    from swarmscope.user_files import whole_path
     from swarmscope.viewing.pictures import write_picture
     from swarmscope.viewing.replay import write_replay
 
@@ -198,7 +199,7 @@ def replay(
     typer.echo(str(write_picture(run_dir)))
     typer.echo(str(page))
     if open_:
-        typer.launch(page.resolve().as_uri())
+        typer.launch(whole_path(page).as_uri())
 
 
 @app.command(

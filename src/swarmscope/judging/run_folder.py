@@ -25,6 +25,8 @@ import yaml
 from swarmscope.errors import ConfigError, InputFileError, SwarmscopeError
 from swarmscope.scenarios.plain import plain
 from swarmscope.sim.scan_files import read_npz
+from swarmscope.texts import load_yaml, read_text
+from swarmscope.user_files import whole_path
 
 CONFIG, WORLD, TRAJECTORY, METRICS = "config.yaml", "world.json", "trajectory.npz", "metrics.json"
 REQUIRED = frozenset({CONFIG, WORLD, TRAJECTORY, METRICS})
@@ -32,6 +34,8 @@ RUN_FILES = REQUIRED | {"paths.png", "replay.html"}
 USER_FILES = frozenset({"planner.py", "task.py"})
 """Copies of a user's files that were run; nothing runs them again."""
 YAML_END = "...\n"
+MOST_BYTES = 1 << 30
+"""Of a text in a run folder."""
 LEFTOVER = re.compile(r"\..+\.\d+\.tmp")
 """What a killed ``swarmscope replay`` may leave in a run folder."""
 
@@ -115,8 +119,8 @@ def read_config(run_dir: Path) -> dict[str, Any]:
     if not text.endswith("\n" + YAML_END):
         raise InputFileError(path, "torn: the end mark is missing")
     try:
-        return _as_mapping(path, yaml.safe_load(text))
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        return _as_mapping(path, load_yaml(text))
+    except (yaml.YAMLError, ValueError, OverflowError, RecursionError) as error:
         raise InputFileError(path, f"torn or foreign YAML ({type(error).__name__})") from None
 
 
@@ -127,7 +131,7 @@ def read_user_files(run_dir: Path) -> dict[str, str]:
 
 
 def _place(out: Path) -> Path:
-    place = Path(out).resolve()
+    place = whole_path(out)
     if not place.name:
         raise ConfigError(str(place), "is not a place for a run folder")
     return place
@@ -293,19 +297,14 @@ def _finished(run_dir: Path) -> Path:
 
 
 def _read_text(path: Path) -> str:
-    try:
-        return path.read_text(encoding="utf-8")
-    except UnicodeDecodeError:
-        raise InputFileError(path, "is not text: torn or foreign") from None
-    except OSError as error:
-        raise InputFileError(path, error.strerror or "cannot be read") from None
+    return read_text(path, MOST_BYTES)
 
 
 def _read_json(path: Path) -> dict[str, Any]:
     text = _read_text(path)
     try:
         return _as_mapping(path, json.loads(text))
-    except (ValueError, RecursionError):
+    except (ValueError, OverflowError, RecursionError):
         raise InputFileError(path, "torn or foreign JSON") from None
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,9 +16,13 @@ from swarmscope.sim.maps.orion import load_maze
 from swarmscope.sim.world import Grid, WorldSpec, grid_corners
 from swarmscope.tasks import Setup, Wanted, check_setup, place_wanted, setup_of_task
 from swarmscope.tasks._check import Keeping, check_keeping
+from swarmscope.tasks._occupancy import domain_of
 
 if TYPE_CHECKING:  # what a scenario says elsewhere changes no place
     from swarmscope.scenarios.scenario import MapModel, Scenario
+
+MOST_M2 = 5e6
+"""Area of a world, of a box round its bounds, starts and goals."""
 
 
 def make_setup(scenario: Scenario) -> Setup:
@@ -27,11 +32,21 @@ def make_setup(scenario: Scenario) -> Setup:
     keeping = Keeping(guard.clearance_m, guard.footprint_clearance_m, scenario.lidar.range_min_m)
     if scenario.place is not None:
         setup = _written_out(scenario)
+        _check_extent(setup, "place")
         check_setup(setup, radius, keeping)
         return setup
     setup = _made(scenario)
+    _check_extent(setup, "map" if scenario.map is not None else "task")
     check_keeping(setup, radius, keeping)
     return setup
+
+
+def _check_extent(setup: Setup, key: str) -> None:
+    """Raise a ConfigError for a world that is too large to look for ways in."""
+    x0, y0, x1, y1 = domain_of(setup.world, [setup.starts, setup.goals])
+    if not (x1 - x0) * (y1 - y0) <= MOST_M2:
+        why = f"bounds, starts and goals span {x1 - x0:.0f} m x {y1 - y0:.0f} m"
+        raise ConfigError(key, f"{why}; ways are looked for on at most {MOST_M2 / 1e6:g} km²")
 
 
 def _written_out(scenario: Scenario) -> Setup:
@@ -67,7 +82,9 @@ def _on_map(scenario: Scenario, place: MapModel) -> Setup:
         if len(given) > scenario.robots:
             raise ConfigError(f"map.{key}", f"{len(given)} are given for {scenario.robots} robots: raise 'robots'")
     wanted = Wanted(scenario.seed, scenario.robots, scenario.robot.radius_m, place.min_distance_m, starts, goals)
-    return place_wanted(world_of(grid), wanted)
+    world = world_of(grid)
+    _check_extent(Setup(world, np.zeros((0, 3)), np.zeros((0, 2))), "map")
+    return place_wanted(world, wanted)
 
 
 def _some_trips(trips: list[Trip], first: int, robots: int) -> list[Trip]:
@@ -105,7 +122,7 @@ def world_of(grid: Grid) -> WorldSpec:
 
 def map_path(name: str) -> Path:
     """Return the file of a map: a path, or that of a map that comes with the package."""
-    return packaged_map(name) if is_packaged(name) else Path(name).expanduser()
+    return packaged_map(name) if is_packaged(name) else Path(os.path.expanduser(name))
 
 
 def is_packaged(name: str) -> bool:

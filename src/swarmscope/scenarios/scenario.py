@@ -28,10 +28,15 @@ def _only_numbers(value: Any) -> Any:
 
 
 NUMBER: Final = BeforeValidator(_only_numbers)
-Real = Annotated[float, NUMBER]
-Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False), NUMBER]
 Fraction = Annotated[float, Field(ge=0.0, le=1.0), NUMBER]
-NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False), NUMBER]
+Size = Annotated[float, Field(ge=1e-3, le=100.0), NUMBER]
+"""Of a body."""
+Side = Annotated[float, Field(ge=1e-3, le=100.0), NUMBER]
+"""Of a cell."""
+Reach = Annotated[float, Field(ge=0.0, le=1000.0), NUMBER]
+"""Of a sensor, or of what is kept free."""
+Pace = Annotated[float, Field(ge=1e-3, le=1000.0), NUMBER]
+"""Speeds, turn rates."""
 Angle = Annotated[float, Field(ge=0.0, le=45.0), NUMBER]
 Rate = Annotated[float, Field(ge=0.0, le=3600.0), NUMBER]
 Duration = Annotated[float, Field(ge=0.0, le=86400.0), NUMBER]
@@ -56,17 +61,17 @@ class _Strict(BaseModel):
 class RobotModel(_Strict):
     """The robots' data sheet: all robots of a run are alike."""
 
-    radius_m: Positive = BODY.radius_m
+    radius_m: Size = BODY.radius_m
     """Radius of the circle round the body [m]."""
-    half_width_m: Positive = BODY.half_width_m
+    half_width_m: Size = BODY.half_width_m
     """Half of the body's width across its direction of travel, r_0 [m]."""
-    v_max_mps: Positive = BODY.v_max_mps
+    v_max_mps: Pace = BODY.v_max_mps
     """Highest speed [m/s]."""
-    a_max_mps2: Positive = BODY.a_max_mps2
+    a_max_mps2: Annotated[float, Field(ge=1e-3, le=1e6), NUMBER] = BODY.a_max_mps2
     """Largest acceleration, also when braking [m/s²]."""
-    w_max_radps: Positive = BODY.w_max_radps
+    w_max_radps: Pace = BODY.w_max_radps
     """Highest turn rate [rad/s]."""
-    sensor_delay_s: NotNegative = BODY.sensor_delay_s
+    sensor_delay_s: Annotated[float, Field(ge=0.0, le=60.0), NUMBER] = BODY.sensor_delay_s
     """From a return to the command that heeds it, t_d: it makes the safety margin r wider [s]."""
 
 
@@ -75,13 +80,13 @@ class LidarModel(_Strict):
 
     beams: Annotated[int, Field(ge=8, le=4096), NUMBER] = LIDAR.beams
     """Beams of a scan."""
-    fov_deg: Annotated[float, Field(gt=0.0, le=360.0), NUMBER] = LIDAR.fov_deg
+    fov_deg: Annotated[float, Field(ge=1.0, le=360.0), NUMBER] = LIDAR.fov_deg
     """Field of view, in the middle of which is straight ahead [°]."""
-    range_m: Positive = LIDAR.range_m
+    range_m: Annotated[float, Field(ge=0.01, le=1000.0), NUMBER] = LIDAR.range_m
     """Longest range; beyond it there is no return [m]."""
-    range_min_m: NotNegative = LIDAR.range_min_m
+    range_min_m: Reach = LIDAR.range_min_m
     """Shortest range; a nearer return is invalid and counts as blocked [m]."""
-    rate_hz: Annotated[float, Field(gt=0.0, le=100.0), NUMBER] = 1.0 / Setting.dt
+    rate_hz: Annotated[float, Field(ge=0.01, le=100.0), NUMBER] = 1.0 / Setting.dt
     """Scans per second; a robot decides once for each scan [Hz]."""
 
 
@@ -139,13 +144,13 @@ class FaultsModel(_Strict):
 class RadioModel(_Strict):
     """The link between robots."""
 
-    range_m: NotNegative = RADIO.range_m
+    range_m: Annotated[float, Field(ge=0.0, le=1e6), NUMBER] = RADIO.range_m
     """Packets to robots farther away are sent in vain [m]."""
-    latency_s: NotNegative = RADIO.latency_s
+    latency_s: Duration = RADIO.latency_s
     """From the end of the sending to the delivery [s]."""
     loss: Fraction = RADIO.loss
     """Share of packets that are lost by chance."""
-    bitrate_bps: Positive = RADIO.bitrate_bps
+    bitrate_bps: Annotated[float, Field(ge=1.0, le=1e12), NUMBER] = RADIO.bitrate_bps
     """Bandwidth of a robot's radio: a packet occupies sender and receiver for its bits over this [bit/s]."""
     exact_features: bool = SHARING.exact_features
     """Send features as float32 instead of bytes (to measure what quantisation costs)."""
@@ -154,21 +159,21 @@ class RadioModel(_Strict):
 class GuardModel(_Strict):
     """Distances kept free around the body."""
 
-    clearance_m: NotNegative = GUARDING.clearance_m
+    clearance_m: Reach = GUARDING.clearance_m
     """Kept free around the body by the guard, which slows down or stops [m]."""
-    footprint_clearance_m: NotNegative = GUARDING.footprint_clearance_m
+    footprint_clearance_m: Reach = GUARDING.footprint_clearance_m
     """Added to the radius where ways are planned: directions that the widened body can take are safe [m]."""
-    persistence_s: NotNegative = GUARDING.persistence_s
+    persistence_s: Duration = GUARDING.persistence_s
     """How long a neighbour that is out of sight is remembered [s]."""
-    lost_s: NotNegative = GUARDING.lost_s
+    lost_s: Duration = GUARDING.lost_s
     """How long a return is kept that is lost while no beam has passed its place, three scans at least; 0: not at all
     [s]."""
-    blind_s: NotNegative = GUARDING.blind_s
+    blind_s: Duration = GUARDING.blind_s
     """A robot brakes when its LiDAR has said nothing for so long, where something was [s]."""
-    thinnest_m: NotNegative = GUARDING.thinnest_m
+    thinnest_m: Reach = GUARDING.thinnest_m
     """Width of the narrowest thing that must not be missed between two beams: robots drive no faster than they can stop
     short of it; 0 asks for nothing [m]."""
-    others_mps: Annotated[float, Field(ge=-1.0, allow_inf_nan=False), NUMBER] = GUARDING.others_mps
+    others_mps: Annotated[float, Field(ge=-1.0, le=1000.0), NUMBER] = GUARDING.others_mps
     """How fast others may be; below 0: as fast as these robots, 0: nothing else moves [m/s]."""
     others_yield: bool = GUARDING.others_yield
     """Whether others run the same guard; before those that do not, a robot stands before they can reach it."""
@@ -179,15 +184,15 @@ class SafetyModel(_Strict):
 
     sector: bool = SAFETY.sector
     """Demand a free sector as wide as the scope angle within the planning distance l_th, as printed (3)."""
-    look_ahead_m: NotNegative = SAFETY.look_ahead_m
+    look_ahead_m: Reach = SAFETY.look_ahead_m
     """How far ahead a direction must be free; 0 leaves it at l_th [m]."""
-    margin_m: NotNegative = SAFETY.margin_m
+    margin_m: Reach = SAFETY.margin_m
     """Kept on both sides of the body within ``look_ahead_m`` [m]."""
-    narrow_m: NotNegative = SAFETY.narrow_m
+    narrow_m: Reach = SAFETY.narrow_m
     """How far ahead a gap must be free that the body just fits, when no direction is safe; 0 is r [m]."""
-    slow_mps: NotNegative = SAFETY.slow_mps
+    slow_mps: Reach = SAFETY.slow_mps
     """At lower speeds margins (18), (2) are those of this speed [m/s]."""
-    speed_step_mps: NotNegative = SAFETY.speed_step_mps
+    speed_step_mps: Reach = SAFETY.speed_step_mps
     """Above it they follow the present speed in steps of this; 0: those of the top speed, as printed [m/s]."""
 
 
@@ -212,9 +217,9 @@ class MapModel(_Strict):
     file: str
     """The map (looked for beside the scenario, too): map_server's YAML, a picture alone, a Moving AI .map, a .npz of
     ORION's mazes, or the name of a packaged map."""
-    resolution_m: Positive | None = None
+    resolution_m: Side | None = None
     """Side of a cell, for files that do not say it: all but map_server's YAML [m]."""
-    number: Annotated[int, Field(ge=0), NUMBER] | None = None
+    number: Annotated[int, Field(ge=0, lt=2**31), NUMBER] | None = None
     """Which of ORION's mazes; its starts and goals are the robots' unless others are given."""
     starts: list[MapStart] = []
     """Where robots start, in the map's coordinates: x, y or x, y, yaw [m, m, rad]; without yaw they look at their goal.
@@ -223,9 +228,9 @@ class MapModel(_Strict):
     """Where robots want to go: x, y [m], in the same way."""
     trips: str | None = None
     """A Moving AI .scen file (looked for beside the scenario, too): starts and goals of its trips."""
-    first_trip: Annotated[int, Field(ge=0), NUMBER] = 0
+    first_trip: Annotated[int, Field(ge=0, lt=2**31), NUMBER] = 0
     """Number of robot 0's trip, 0 is the first; the others have the next ones."""
-    min_distance_m: NotNegative | None = None
+    min_distance_m: Annotated[float, Field(ge=0.0, le=LONGEST_M), NUMBER] | None = None
     """From a start to its goal, where one of them is drawn, at least; null is 8 m, in maps whose free space is shorter
     than 20 m two fifths of that [m]."""
 
@@ -235,9 +240,9 @@ class WorldModel(_Strict):
 
     world: WorldSpec
     """Bounds and obstacles."""
-    starts: list[tuple[Real, Real, Real]]
+    starts: list[tuple[Metres, Metres, Heading]]
     """Where each robot starts: x, y, yaw [m, m, rad]."""
-    goals: list[tuple[Real, Real]]
+    goals: list[tuple[Metres, Metres]]
     """Where each robot wants to go: x, y [m]."""
 
 
@@ -281,7 +286,7 @@ class Scenario(_Strict):
     """Distances kept free around the body."""
     safety: SafetyModel = SafetyModel()
     """Which directions are safe."""
-    limit_s: Positive = Setting.limit_s
+    limit_s: Annotated[float, Field(ge=1e-3, le=1e6), NUMBER] = Setting.limit_s
     """Simulated time after which the run ends; it ends earlier when all have arrived or collided [s]."""
     substeps: Annotated[int, Field(ge=1, le=1000), NUMBER] = Setting.substeps
     """Steps of motion and contact between two scans; more are taken where these leave the arc driven by 0.1 mm."""

@@ -26,6 +26,8 @@ SIDE_M = (0.5, 3.0)
 RADIUS_M = (0.5, 3.0)
 REDRAWS = 200
 """Of one obstacle; after so many it is left out."""
+LEFT_OUT = 20
+"""When so many more are left out than placed there is no point in going on."""
 
 Floats = NDArray[np.float64]
 Range = tuple[float, float]
@@ -66,15 +68,18 @@ def draw_obstacles(
 ) -> list[Obstacle]:
     """Return obstacles, from the first to the second of ``counts``, ``free_m`` [m] off the points ``keep_free (K, 2)``.
 
-    One for which REDRAWS places are not enough is left out.
+    One for which REDRAWS places are not enough is left out. Errors: ConfigError if most of many are.
     """
     obstacles: list[Obstacle] = []
-    for _ in range(int(rng.integers(int(counts[0]), int(counts[1]) + 1))):
+    wanted = int(rng.integers(int(counts[0]), int(counts[1]) + 1))
+    for number in range(wanted):
         for _ in range(REDRAWS):
             one = _draw_obstacle(rng, kind, sizes)
             if _stays_off(one, keep_free, free_m):
                 obstacles.append(one)
                 break
+        if number - len(obstacles) > LEFT_OUT + len(obstacles):
+            raise ConfigError("most", f"{wanted} obstacles do not fit: lower it, or 'robots', or enlarge the map")
     return obstacles
 
 
