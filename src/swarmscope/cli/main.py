@@ -45,6 +45,7 @@ Controllers = Annotated[
     ),
 ]
 DiskMap = Annotated[str, typer.Option("--map", help="c0, u, crevice, one-disc, minima, empty, random:SEED, FILE.yaml.")]
+CallLimit = Annotated[float, typer.Option(min=0.001, help="Seconds that a call of your controller may take.")]
 Permutation = Annotated[str | None, typer.Option(help="Goals of robots 0, 1, ...: 0,3,1,4,2. Else 0,1,2,...")]
 ExperimentFile = Annotated[str, typer.Argument(metavar="FILE", help="Experiment file (YAML), or a shipped one's name.")]
 Maps = Annotated[int | None, typer.Option(min=1, help="Only the first so many seeds (the papers have 20; GIWT 500).")]
@@ -418,11 +419,12 @@ def disk_run(
         float | None, typer.Option(help="Their radius; by default they cover as much as 5 of 0.05.")
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder, else runs/disk/<map>-<permutation>.")] = None,
+    call_limit: CallLimit = 10.0,
 ) -> None:
     """Play one run with one or several controllers; pictures and a replay page."""
     from swarmscope.cli.disk import run_command
 
-    run_command(controller or ["reactive"], map_, permutation, robots, radius, out)
+    run_command(controller or ["reactive"], map_, permutation, robots, radius, out, call_limit)
 
 
 @disk.command(
@@ -438,11 +440,12 @@ def disk_table(
     permutation: Annotated[list[str] | None, typer.Option(help="Permutation; repeatable. Else all 120.")] = None,
     out: Annotated[Path, typer.Option(help="Folder of page, figures and runs.")] = Path("runs/disk/table"),
     workers: Workers = None,
+    call_limit: CallLimit = 10.0,
 ) -> None:
     """Play all 600 runs and print the report's Table 1 beside ours and the bound."""
     from swarmscope.cli.disk import table_command
 
-    table_command(controller or ["report"], map_ or [], permutation or [], out, workers)
+    table_command(controller or ["report"], map_ or [], permutation or [], out, workers, call_limit)
 
 
 @disk.command(
@@ -458,11 +461,12 @@ def disk_random(
     seeds: Annotated[str, typer.Option(help="Set of seeds or range.")] = "disk-evaluation",
     out: Annotated[Path, typer.Option(help="Folder of page, figures and runs.")] = Path("runs/disk/random"),
     workers: Workers = None,
+    call_limit: CallLimit = 10.0,
 ) -> None:
     """Play random maps with traps and narrow passages."""
     from swarmscope.cli.disk import random_command
 
-    random_command(controller or ["reactive"], robots or [5], seeds, maps, out, workers)
+    random_command(controller or ["reactive"], robots or [5], seeds, maps, out, workers, call_limit)
 
 
 @disk.command(
@@ -481,11 +485,12 @@ def disk_field(
     ] = False,
     resolution: Annotated[int | None, typer.Option(min=5, max=401, help="Points along each side.")] = None,
     out: Annotated[Path | None, typer.Option(help="PNG file.")] = None,
+    call_limit: CallLimit = 10.0,
 ) -> None:
     """Draw where a robot would go from anywhere, and where it would get stuck."""
     from swarmscope.cli.disk import field_command
 
-    field_command(controller, map_, permutation, robot, alone, resolution, out)
+    field_command(controller, map_, permutation, robot, alone, resolution, out, call_limit)
 
 
 @disk.command("start", epilog="Example: [bold]swarmscope disk start mine.py[/bold]")

@@ -127,7 +127,8 @@ def _laid_out(log: ScanLog, use: Use, rig: Rig) -> tuple[np.ndarray, np.ndarray]
     """Return scans (K, M) along the rig's rays [m], and how many readings of each were too near."""
     values = np.array(log.ranges_m[:, :: use.beam_step], np.float32, order="C")
     if use.no_return is not None:
-        values[values == np.float32(use.no_return)] = np.inf
+        with np.errstate(over="ignore"):
+            values[values == np.float32(use.no_return)] = np.inf
     lengths = np.full(len(values), log.ranges_m.shape[1]) if log.lengths is None else log.lengths
     sensor, below = rig.sensor, np.zeros(len(values), int)
     scans = np.empty((len(values), sensor.beams), np.float32)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from typing import Any
 
 import yaml
 
+from swarmscope.bounds import number_of
 from swarmscope.errors import ConfigError
 from swarmscope.scenarios.plain import plain
 from swarmscope.texts import load_yaml
@@ -67,7 +68,5 @@ def _read(text: str, change: str) -> Any:
     except (yaml.YAMLError, ValueError, RecursionError) as error:
         why = getattr(error, "problem", None) or "it is nested too deep, or a date that there is not"
         raise ConfigError(f"--set {change}", f"the value is not valid YAML: {why}") from None
-    if isinstance(value, str):
-        with suppress(ValueError):
-            return float(value)
-    return value
+    number = number_of(value) if isinstance(value, str) else math.nan
+    return value if math.isnan(number) else number

@@ -13,7 +13,7 @@ from swarmscope.sim.maps import Trip, closed, load_map, load_movingai, load_trip
 from swarmscope.sim.maps.map_server import YAML
 from swarmscope.sim.maps.movingai import place_of
 from swarmscope.sim.maps.orion import load_maze
-from swarmscope.sim.world import Grid, WorldSpec, grid_corners
+from swarmscope.sim.world import LONGEST_M, Grid, WorldSpec, grid_corners
 from swarmscope.tasks import Setup, Wanted, check_setup, place_wanted, setup_of_task
 from swarmscope.tasks._check import Keeping, check_keeping
 from swarmscope.tasks._occupancy import domain_of
@@ -117,6 +117,9 @@ def world_of(grid: Grid) -> WorldSpec:
     """Return the world of a map; its bounds are the box round the picture, and it is solid beyond."""
     corners = grid_corners(grid)
     (x0, y0), (x1, y1) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
+    if not np.abs(corners).max() <= LONGEST_M:
+        why = f"it reaches from ({x0:g}, {y0:g}) to ({x1:g}, {y1:g}) m, and worlds to {LONGEST_M:g} m"
+        raise ConfigError("map", f"{why}: look at the resolution and at its origin")
     return WorldSpec(obstacles=[closed(grid)], bounds=(x0, y0, x1, y1))
 
 

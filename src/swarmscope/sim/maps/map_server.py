@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import yaml
 
+from swarmscope.bounds import number_of
 from swarmscope.errors import ConfigError, InputFileError
 from swarmscope.sim.maps.files import as_grid
 from swarmscope.sim.maps.picture import MODES, Reading, free_cells
@@ -104,10 +105,7 @@ def _need(path: Path, settings: dict[str, Any], key: str) -> Any:
 
 def _as_number(path: Path, key: str, value: Any) -> float:
     """Return a finite number; text such as 1e-1, which YAML 1.1 does not take for a number, is accepted."""
-    try:
-        number = math.nan if isinstance(value, bool) else float(value)
-    except (TypeError, ValueError, OverflowError):
-        number = math.nan
+    number = number_of(value)
     if not math.isfinite(number):
         raise ConfigError(f"{path}: {key}", f"must be a finite number, got {value!r}")
     return number
