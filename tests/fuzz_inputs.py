@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import copy
 import dataclasses
 import faulthandler
 import functools
@@ -116,7 +117,7 @@ def _scenario(rng: random.Random) -> dict[str, Any]:
             values.setdefault(group, {})
             values[group] |= {key: value for key, value in keys.items() if rng.random() < 0.5}
     if rng.random() < 0.4:
-        values["planner"] = {"name": rng.choice(["nav-scope", "dh-bug", "sfm-mas", "bug-scope"]), "params": {}}
+        values["planner"] = {"name": rng.choice(["nav-scope", "dh-bug", "sfm-mas", "nav-i"]), "params": {}}
     return values
 
 
@@ -255,9 +256,9 @@ def _value(rng: random.Random, key: Any, old: Any) -> Any:
     """Return another value for a key; numbers that are valid and expensive are left out."""
     choice = rng.random()
     if choice < 0.25:
-        return rng.choice(OTHERS)
+        return copy.deepcopy(rng.choice(OTHERS))
     if choice < 0.4 and isinstance(old, list):
-        return old + old[:1] * rng.choice([1, 2, 50])
+        return old + copy.deepcopy(old[:1]) * rng.choice([1, 2, 50])
     new = rng.choice(NUMBERS)
     if choice > 0.7 and isinstance(old, int | float) and not isinstance(old, bool):
         new = old * rng.choice([-1, 0.5, 2, 3, 10, 1e3, 1e6, 1e-3])
@@ -296,9 +297,9 @@ def _mutated(rng: random.Random, values: Any) -> Any:
             new = rng.choice(
                 [f"{last}x", str(last).upper(), 1, "", None, True, "a\0", "</script><img src=x>", "\u00e9"]
             )
-            inner[new] = inner.pop(last) if what < 0.9 else rng.choice([*NUMBERS, *OTHERS])
+            inner[new] = inner.pop(last) if what < 0.9 else copy.deepcopy(rng.choice([*NUMBERS, *OTHERS]))
         else:
-            inner.insert(int(last), rng.choice([*NUMBERS, *OTHERS]))
+            inner.insert(int(last), copy.deepcopy(rng.choice([*NUMBERS, *OTHERS])))
     return values
 
 

@@ -69,11 +69,8 @@ def _of_the_system(error: OSError, words: list[str]) -> str:
     why = "the disk is full" if error.errno == errno.ENOSPC else error.strerror or str(error)
     if error.filename is not None:
         return f"{_shown(error.filename)}: {why}"
-    with suppress(OSError, ValueError, AttributeError):
-        sys.stdout.flush()
-        return f"{_what_was_read(words)}: {why}"
     _drop_output()
-    return f"standard output: {why}"
+    return f"{_what_was_read(words)}: the output cannot be written: {why}"
 
 
 def _shown(name: Any) -> str:

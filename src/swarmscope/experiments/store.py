@@ -29,6 +29,7 @@ from swarmscope.experiments.experiment import Unit
 from swarmscope.experiments.results import Run
 from swarmscope.experiments.work import MEASURED, Finished
 from swarmscope.judging.metrics import COUNTED, METRICS
+from swarmscope.texts import check_regular
 
 APPLICATION = 0x73776D73  # "swms"
 VERSION = 1
@@ -64,6 +65,8 @@ class Store:
         self.path = Path(path)
         if not create and not self.path.exists():
             raise InputFileError(self.path, "no such store; nothing has been run into it yet")
+        if self.path.exists():
+            check_regular(self.path, None)
         with self._explained():
             if create:
                 self.path.parent.mkdir(parents=True, exist_ok=True)

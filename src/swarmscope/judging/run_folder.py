@@ -80,10 +80,22 @@ def check_out(out: Path) -> Path:
     """
     place = _place(out)
     with _explained(place):
+        _refuse_impossible(place)
         if place.parent.is_dir():
             with _locked(place.parent):
                 _refuse_foreign(place)
     return place
+
+
+def _refuse_impossible(place: Path) -> None:
+    """Raise ``ConfigError`` where no folder can be made: in what is none, or in place of a link that leads nowhere."""
+    if place.is_symlink():
+        raise ConfigError(str(place), "is a link that leads nowhere, or in a circle")
+    there = next(above for above in place.parents if os.path.lexists(above))
+    if not there.is_dir():
+        raise ConfigError(str(place), f"cannot be made: {there} is no folder")
+    if not os.access(there, os.W_OK | os.X_OK):
+        raise ConfigError(str(place), f"cannot be made: {there} may not be written to")
 
 
 def check_same(out: Path, config: Mapping[str, Any]) -> None:

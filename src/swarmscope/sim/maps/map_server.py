@@ -14,7 +14,7 @@ from swarmscope.errors import ConfigError, InputFileError
 from swarmscope.sim.maps.files import as_grid
 from swarmscope.sim.maps.picture import MODES, Reading, free_cells
 from swarmscope.sim.world import Grid, grid_from_solid, solid_from_grid
-from swarmscope.texts import read_yaml
+from swarmscope.texts import check_regular, read_yaml
 
 YAML = (".yaml", ".yml")
 """Ends of the names of map descriptions; any other file is a picture."""
@@ -142,6 +142,11 @@ def _image_path(path: Path, settings: dict[str, Any]) -> Path:
     if not isinstance(name, str):
         raise ConfigError(f"{path}: image", f"must be a file name, got {name!r}")
     try:
-        return path.parent / Path(name).expanduser()
+        image = path.parent / Path(name).expanduser()
     except RuntimeError as error:
         raise ConfigError(f"{path}: image", f"{name!r}: {error}") from None
+    try:
+        check_regular(image, None)
+    except InputFileError as error:
+        raise InputFileError(image, f"{error.why}; it is the image of {path}") from None
+    return image
