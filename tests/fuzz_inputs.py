@@ -78,6 +78,10 @@ BOMB = "a: &a [1,1,1,1,1,1,1,1,1]\n" + "".join(
 )
 
 
+DEAR_KEYS = r"robots|size_m|length_m|width_m|room_m|way_m|density|most"
+"""Keys whose larger values are valid and expensive."""
+
+
 class Case(NamedTuple):
     """Files by name, and the words of the command."""
 
@@ -335,7 +339,7 @@ def _torn_text(rng: random.Random, content: bytes) -> bytes:
     at, what = rng.randrange(len(lines) or 1), rng.randrange(8)
     if what == 0 and lines:
         lines.insert(at, lines[at])
-    elif what == 1 and lines:
+    elif what == 1 and lines and not re.search(DEAR_KEYS, lines[at]):
         lines[at] = re.sub(r"(-?\d[\d.e+-]*)", lambda m: str(rng.choice([*NUMBERS, *PLAIN_TEXT])), lines[at], count=1)
     elif what == 2:
         lines.insert(at, BOMB)

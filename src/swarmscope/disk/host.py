@@ -50,7 +50,11 @@ def serve(asked: int, answers: int) -> None:
     with suppress(OSError, AttributeError):
         ctypes.CDLL(None).prctl(DIES_WITH_PARENT, signal.SIGKILL)
     with os.fdopen(asked, "rb") as source, os.fdopen(answers, "wb", buffering=0) as sink:
-        _serve(source, sink)
+        try:
+            _serve(source, sink)
+        except BaseException as error:  # a file may have broken anything here, too
+            with suppress(BaseException):
+                _say(sink, WRONG, f"its process failed: {type(error).__name__}: {one_line(error)}")
         os._exit(0)  # what a file leaves running, or does at the end, is nobody's business
 
 
