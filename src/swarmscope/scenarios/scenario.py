@@ -24,6 +24,8 @@ def _only_numbers(value: Any) -> Any:
     """Refuse what Python would take for a number: true is no 1, and text is text."""
     if isinstance(value, bool | str | bytes):
         raise ValueError(f"must be a number, not {value!r}" if not isinstance(value, bool) else "must be a number")
+    if isinstance(value, float) and not math.isfinite(value):
+        raise ValueError("must be a finite number")
     return value
 
 
