@@ -45,12 +45,12 @@ Controllers = Annotated[
     ),
 ]
 DiskMap = Annotated[str, typer.Option("--map", help="c0, u, crevice, one-disc, minima, empty, random:SEED, FILE.yaml.")]
-CallLimit = Annotated[float, typer.Option(min=0.001, help="Seconds that a call of your controller may take.")]
+CallLimit = Annotated[float, typer.Option(min=0.001, max=86400.0, help="Seconds for a call of your controller.")]
 Permutation = Annotated[str | None, typer.Option(help="Goals of robots 0, 1, ...: 0,3,1,4,2. Else 0,1,2,...")]
 ExperimentFile = Annotated[str, typer.Argument(metavar="FILE", help="Experiment file (YAML), or a shipped one's name.")]
 Maps = Annotated[int | None, typer.Option(min=1, help="Only the first so many seeds (the papers have 20; GIWT 500).")]
 EngineName = Annotated[str, typer.Option(help="in-process, local (processes) or ray (machines).")]
-Workers = Annotated[int | None, typer.Option(min=1, help="Processes, else one for each core.")]
+Workers = Annotated[int | None, typer.Option(min=1, max=1024, help="Processes, else one a core.")]
 Address = Annotated[str | None, typer.Option(help="Of a Ray cluster; 'auto' for the one this machine belongs to.")]
 StorePath = Annotated[Path | None, typer.Option(help="File with the results, else runs/<name>/results.sqlite.")]
 ReportOut = Annotated[Path | None, typer.Option(help="Folder of the report, else runs/<name>/report.")]
@@ -249,7 +249,9 @@ def barn(
     "[bold]swarmscope storm --replay runs/storm/breach-3-117.yaml[/bold]"
 )
 def storm(
-    minutes: Annotated[float | None, typer.Option(min=0.0, help="No run begins later; else 1 without --runs.")] = None,
+    minutes: Annotated[
+        float | None, typer.Option(min=0.0, max=1e6, help="No run begins later; else 1 without --runs.")
+    ] = None,
     runs: Annotated[int | None, typer.Option(min=1, help="Not more runs than these.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of everything that is drawn, with the number of a run.")] = 0,
     into: Annotated[Path | None, typer.Option(help="JSON file that adds storms up; its runs are skipped.")] = None,
@@ -519,7 +521,7 @@ def disk_list() -> None:
 def giwt_data(
     data: GiwtData = Path("runs/giwt/data"),
     set_of: GiwtSets = None,
-    samples: Annotated[int, typer.Option(min=1, help="Of each set, at least.")] = 100_000,
+    samples: Annotated[int, typer.Option(min=1, max=10**9, help="Of each set, at least.")] = 100_000,
     workers: Workers = None,
     check: Annotated[bool, typer.Option("--check", help="Only check every shard's checksum.")] = False,
 ) -> None:
@@ -568,7 +570,8 @@ def giwt_eval(
     set_of: GiwtSets = None,
     split: Annotated[str, typer.Option(help="train, validation or test.")] = "test",
     radius: Annotated[
-        list[float] | None, typer.Option(min=0.1, help="Also score robots that see only so far, metres; several times.")
+        list[float] | None,
+        typer.Option(min=0.1, max=1000.0, help="Score robots that see only so far, m, too; repeatable."),
     ] = None,
     out: Annotated[Path | None, typer.Option(help="JSON file for all figures.")] = None,
     pictures: Annotated[Path | None, typer.Option(help="Folder for pictures of layers and of radii.")] = None,
@@ -583,7 +586,7 @@ def giwt_eval(
 def giwt_ceiling(
     data: GiwtData = Path("runs/giwt/data"),
     set_of: GiwtSets = None,
-    view: Annotated[float, typer.Option(min=0.1, help="Radius seen, metres.")] = 5.0,
+    view: Annotated[float, typer.Option(min=0.1, max=1000.0, help="Radius seen, metres.")] = 5.0,
 ) -> None:
     """Show how often the expert's sides differ between samples that look alike."""
     from swarmscope.cli.giwt import ceiling_command

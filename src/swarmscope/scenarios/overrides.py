@@ -37,7 +37,7 @@ def set_key(values: dict[str, Any], change: str) -> None:
     path, equals, text = change.partition("=")
     if not equals or not all(path.split(".")):
         raise ConfigError(f"--set {change}", "must look like key.path=value")
-    set_path(values, path.split("."), _read(text, change), f"--set {change}")
+    set_path(values, path.split("."), read_value(text, change), f"--set {change}")
 
 
 def set_path(values: dict[str, Any], path: Sequence[str], value: Any, where: str) -> None:
@@ -61,7 +61,7 @@ def override(values: dict[str, Any], changes: Mapping[str, Any], where: str) -> 
             set_path(values, path, plain(value), f"{where}: {'.'.join(path)}")
 
 
-def _read(text: str, change: str) -> Any:
+def read_value(text: str, change: str) -> Any:
     """Return ``text`` as YAML reads it; 1e-3, which YAML 1.1 takes for text, is a number."""
     try:
         value = load_yaml(text)
