@@ -32,6 +32,8 @@ __all__ = ["SIGNATURE", "UserController", "UserControllerError", "check_file", "
 
 CALL_S = 10.0
 """How long a call may take; the first one may compile something."""
+AT_ONCE = 65536
+"""Bytes that are read at once from the process."""
 LOAD_S = 60.0
 """How long loading the file may take."""
 
@@ -120,6 +122,7 @@ class _Process:
 
     def __init__(self, path: Path, of: Problem | None) -> None:
         compiled(path)  # what is no file, or no Python, needs no process
+        self._read = b""
         asked, self._ask = os.pipe()
         self._answers, answers = os.pipe()
         start = f"import sys; sys.path[:] = {sys.path!r}; from swarmscope.disk.host import serve; "
@@ -165,15 +168,16 @@ class _Process:
 
     def _receive(self, size: int, seconds: float, what: str) -> bytes:
         """Return so many bytes. Errors: _EndedError after ``seconds``, or at the end of the process."""
-        found, until = b"", time.monotonic() + seconds
-        while len(found) < size:
+        until = time.monotonic() + seconds
+        while len(self._read) < size:
             ready, _, _ = select.select([self._answers], [], [], max(0.0, until - time.monotonic()))
             if not ready:
                 raise _EndedError(f"{what} takes longer than {seconds:g} s (--call-limit)")
-            part = os.read(self._answers, size - len(found))
+            part = os.read(self._answers, AT_ONCE)
             if not part:
                 raise _EndedError(self._gone())
-            found += part
+            self._read += part
+        found, self._read = self._read[:size], self._read[size:]
         return found
 
     def _gone(self) -> str:
