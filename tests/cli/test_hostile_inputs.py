@@ -128,6 +128,15 @@ def test_a_full_or_closed_output_is_told():
     assert (done.returncode, done.stderr) == (2, "swarmscope: disk: the output cannot be written: the disk is full\n")
 
 
+def test_with_all_streams_closed_a_controller_still_finds_its_judge(tmp_path):
+    (tmp_path / "out.py").write_text(
+        "def compute_gradients(state, targets, obstacles, r):\n    print('hello')\n    return 0 * state + [[1, 0]]\n"
+    )
+    words = f"'{sys.executable}' -m swarmscope disk run out.py --out r <&- >&- 2>&-"
+    assert subprocess.run(["sh", "-c", words], cwd=tmp_path, check=False).returncode == 1
+    assert (tmp_path / "r" / "report.html").is_file()
+
+
 def test_errors_of_the_system_and_of_libraries_are_one_line_with_what_was_read(monkeypatch):
     monkeypatch.delenv(TRACEBACK, raising=False)
     words = ["run", "s.yaml", "--robots", "3"]

@@ -27,6 +27,7 @@ class PlainErrors(TyperGroup):
     def invoke(self, ctx: Any) -> Any:
         """Run the command."""
         words = [*ctx._protected_args, *ctx.args]
+        _open_what_is_closed()
         _never_fail_to_print()
         try:
             result = super().invoke(ctx)
@@ -88,6 +89,15 @@ def _end(words: str, code: int) -> NoReturn:
     with suppress(OSError, ValueError):
         typer.echo(f"swarmscope: {words}", err=True)
     raise typer.Exit(code) from None
+
+
+def _open_what_is_closed() -> None:
+    """Let closed standard streams lead nowhere; a file or a pipe that is opened later would else take their place."""
+    for stream in range(3):
+        try:
+            os.fstat(stream)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # takes the lowest number that is free
 
 
 def _never_fail_to_print() -> None:
