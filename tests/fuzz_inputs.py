@@ -371,7 +371,9 @@ def _run_scenario(rng: random.Random) -> Case:
     words = ["run", "s.yaml"]
     if rng.random() < 0.3:
         place = rng.choice(list(_paths(_scenario(rng))))
-        words += ["--set", f"{'.'.join(map(str, place))}={rng.choice([*NUMBERS, *OTHERS[:20]])}".replace("\0", "")]
+        dear = re.search(DEAR_KEYS, str(place[-1]))
+        value = rng.choice(OTHERS[:20] if dear else [*NUMBERS, *OTHERS[:20]])
+        words += ["--set", f"{'.'.join(map(str, place))}={value}".replace("\0", "")]
     return Case({"s.yaml": _yaml_file(rng, _scenario(rng))} | _maps(rng), words)
 
 
