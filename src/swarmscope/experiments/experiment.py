@@ -203,6 +203,8 @@ def parse_experiment(values: Any, where: str) -> Experiment:
         seeds = seed_set(experiment.seeds)
     except ConfigError as error:
         raise ConfigError(f"{where}: {error.where}", error.why) from None
+    except UnknownNameError as error:
+        raise UnknownNameError(error.kind, error.name, error.valid, f"{where}: seeds") from None
     for place, planner, keys in _variants(experiment):
         parse_scenario(keys | {"seed": seeds[0]}, f"{where}: {place}, {planner}")
     return experiment
