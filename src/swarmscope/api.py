@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from swarmscope.errors import ConfigError, InputFileError
+from swarmscope.errors import ConfigError, InputFileError, nearest_hint
 from swarmscope.experiments.warm_up import kernels_are_cold
 from swarmscope.judging.references import References, reference_ways
 from swarmscope.judging.run import Contents, contents, play
@@ -43,11 +43,20 @@ KEY_FIGURES = (
 )
 
 
+class _Figures(dict[str, Any]):
+    """The figures by name; a KeyError names the nearest."""
+
+    def __missing__(self, name: str) -> Any:
+        """Say which figures there are."""
+        raise KeyError(f"no figure '{name}'{nearest_hint(str(name), sorted(self))}")
+
+
 class Run:
     """A finished run: what was asked for, what happened, and how to look at it."""
 
     def __init__(self, found: Contents, references: References | None = None) -> None:
         self._found, self._references = found, references
+        self._metrics = _Figures(found.metrics)
 
     @property
     def scenario(self) -> dict[str, Any]:
@@ -57,7 +66,7 @@ class Run:
     @property
     def metrics(self) -> dict[str, Any]:
         """The figures, as in ``metrics.json``."""
-        return self._found.metrics
+        return self._metrics
 
     @property
     def world(self) -> dict[str, Any]:

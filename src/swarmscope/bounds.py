@@ -135,14 +135,17 @@ def _value(field: Field, value: Any, where: str) -> Value:
         return value
     if field.kind is bool and value in (True, False):
         return bool(value)
-    number = _number(value) if field.kind in (float, int) else math.nan
+    number = number_of(value) if field.kind in (float, int) else math.nan
     whole = field.kind is float or (math.isfinite(number) and number == int(number))
     if math.isfinite(number) and whole and field.bounds.low <= number <= field.bounds.high:
         return int(number) if field.kind is int else number
     raise ConfigError(f"{where}: {field.name}", f"must be {about(field)}, not {value!r}")
 
 
-def _number(value: Any) -> float:
+def number_of(value: Any) -> float:
+    """Return a number, or what text says in plain digits; NaN for anything else."""
+    if isinstance(value, str) and ("_" in value or not value.isascii()):
+        return math.nan
     if isinstance(value, int | float | str) and not isinstance(value, bool):
         with suppress(ValueError, OverflowError):
             return float(value)

@@ -20,7 +20,7 @@ from types import ModuleType
 from typing import Any, NamedTuple
 
 from swarmscope.errors import ConfigError, InputFileError, UnknownNameError
-from swarmscope.user_files import guarded, is_file_name, line_of, load_file, read_code
+from swarmscope.user_files import guarded, is_file_name, line_of, load_file, read_code, whole_path
 
 NAMED = re.compile(rb"""^NAME[ ]*=[ ]*(["'])([^"'\n]+)\1""", re.MULTILINE)
 
@@ -77,7 +77,7 @@ def find(kind: Kind, name: str) -> Found:
     """Return where a member is, without importing it. Errors: UnknownNameError, InputFileError, ConfigError."""
     if is_file_name(name):
         read_code(Path(name))
-        return Found(name, None, Path(name).resolve())
+        return Found(name, None, whole_path(name))
     if name in _shipped(kind):
         module = _shipped(kind)[name]
         return Found(name, module, _folder(kind) / f"{module.rpartition('.')[2]}.py")

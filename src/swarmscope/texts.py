@@ -12,6 +12,10 @@ import yaml
 from swarmscope.errors import InputFileError
 
 MOST_BYTES = 64 << 20
+MOST_YAML_BYTES = 4 << 20
+"""Of YAML, which takes four seconds a megabyte to read (the faster reader in C crashes on deep nesting)."""
+MOST_REPEATED, MOST_NODES = 20, 10_000
+"""Aliases may make so many times as many values of a text as it has, and so many more."""
 
 
 def check_regular(path: Path, most_bytes: int | None = MOST_BYTES) -> None:
@@ -46,7 +50,7 @@ def read_text(path: Path, most_bytes: int = MOST_BYTES) -> str:
 
 def read_yaml(path: Path) -> Any:
     """Return what a YAML file holds. Errors: InputFileError."""
-    text = read_text(path)
+    text = read_text(path, MOST_YAML_BYTES)
     try:
         return load_yaml(text)
     except RecursionError:
@@ -60,7 +64,40 @@ def load_yaml(text: str) -> Any:
 
     Raises yaml.YAMLError, ValueError, RecursionError.
     """
-    return yaml.load(text, Loader=_Loader)  # noqa: S506  a SafeLoader
+    loader = _Loader(text)
+    try:
+        node = loader.get_single_node()
+        if node is None:
+            return None
+        _check_aliases(node)
+        return loader.construct_document(node)
+    finally:
+        loader.dispose()
+
+
+def _check_aliases(root: yaml.Node) -> None:
+    """Raise a yaml.YAMLError for aliases that stand for far more than the text says, or for what contains them."""
+    sizes: dict[int, int | None] = {}
+    whole = _size(root, sizes)
+    if whole > MOST_REPEATED * len(sizes) + MOST_NODES:
+        raise _error(f"its aliases stand for {whole:.3g} values", root)
+
+
+def _size(node: yaml.Node, sizes: dict[int, int | None]) -> int:
+    """Return how many nodes there are in a node, those of aliases each time that they stand somewhere."""
+    if id(node) in sizes:
+        known = sizes[id(node)]
+        if known is None:
+            raise _error("an alias stands within what it stands for", node)
+        return known
+    sizes[id(node)] = None
+    size = 1
+    if isinstance(node, yaml.SequenceNode):
+        size += sum(_size(part, sizes) for part in node.value)
+    elif isinstance(node, yaml.MappingNode):
+        size += sum(_size(key, sizes) + _size(value, sizes) for key, value in node.value)
+    sizes[id(node)] = size
+    return size
 
 
 class _Loader(yaml.SafeLoader):

@@ -46,6 +46,14 @@ def short_name(name: str) -> str:
     return Path(name).stem if is_file_name(name) else name
 
 
+def whole_path(path: Path | str) -> Path:
+    """Return the absolute path, links followed as far as they lead. Errors: InputFileError."""
+    try:
+        return Path(os.path.realpath(path))
+    except ValueError:  # a null character
+        raise InputFileError(repr(str(path)), "is not a file's name") from None
+
+
 def read_code(path: Path) -> bytes:
     """Return the bytes of a regular file; nothing else is opened. Errors: InputFileError."""
     try:

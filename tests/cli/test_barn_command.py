@@ -105,7 +105,7 @@ WRONG = {
     "planner": (["--planner", "nav-scop"], ["world 1: planner.name", "did you mean 'nav-scope'"]),
     "planner twice": (["--planner", "nav-i", "--planner", "nav-i"], ["--planner", "'nav-i' is there twice"]),
     "speed twice": (["--speed", "1", "--speed", "1.0"], ["--speed", "'1' is there twice"]),
-    "speed": (["--speed", "0"], ["robot.v_max_mps", "greater than 0"]),
+    "speed": (["--speed", "0"], ["robot.v_max_mps", "greater than or equal to 0.001"]),
     "key": (["--set", "radio.los=1"], ["radio.los", "unknown key", "did you mean 'loss'"]),
     "parameter": (["--set", "planner.params.w_ii=1"], ["parameter 'w_ii'", "did you mean 'w_i'"]),
     "their key": (["--set", "robot.v_max_mps=1"], ["--set robot.v_max_mps=1", "--speed"]),

@@ -135,3 +135,11 @@ def test_a_controller_that_fails_is_told_where(tmp_path):
     mine.write_text("def compute_gradients(state, targets, obstacles, r):\n    return targets[:3]\n")
     told = refused("disk", "table", mine, "--map", "c0", "--permutation", "01234", "--out", tmp_path / "t")
     assert "returned an array of shape (3, 2), wanted (5, 2)" in told and "map c0" in told
+
+
+def test_a_run_that_collides_does_not_end_with_0(tmp_path):
+    body = "def compute_gradients(state, targets, obstacles, r): return 0 * state + [[1, 0]]\n"
+    (tmp_path / "out.py").write_text(body)
+    result = swarmscope("disk", "run", tmp_path / "out.py", "--out", tmp_path / "r", "--call-limit", "5")
+    assert result.exit_code == 1 and "out: robot 0 left the disk in step 0" in result.stdout
+    assert (tmp_path / "r" / "report.html").is_file()

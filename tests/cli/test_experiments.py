@@ -1,6 +1,7 @@
 """``swarmscope experiment`` and ``swarmscope reproduce`` as people type them."""
 
 import csv
+import sqlite3
 
 import pytest
 import yaml
@@ -72,6 +73,20 @@ def test_a_damaged_store_is_left_alone(file, tmp_path):
     for word in ("run", "resume", "status", "report"):
         assert "bad.sqlite" in refused("experiment", word, file, "--store", bad)
     assert bad.read_bytes() == before
+
+
+def test_the_status_of_a_store_with_damaged_rows_is_not_0(file, tmp_path):
+    store = tmp_path / "runs.sqlite"
+    more = ("--store", store, "--maps", 1)
+    assert swarmscope("experiment", "run", file, *more, "--engine", "in-process").exit_code == 0
+    with sqlite3.connect(store) as opened:
+        opened.execute("UPDATE runs SET cases = 'x' WHERE key = (SELECT min(key) FROM runs)")
+    opened.close()
+    result = swarmscope("experiment", "status", file, *more)
+    assert result.exit_code == 2
+    assert "runs.sqlite: damaged row: " in result.stderr and "cases is no JSON" in result.stderr
+    assert swarmscope("experiment", "resume", file, *more, "--engine", "in-process").exit_code == 0
+    assert swarmscope("experiment", "status", file, *more).exit_code == 0
 
 
 def test_help_has_examples():

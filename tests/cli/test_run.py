@@ -181,7 +181,7 @@ WRONG = {
     "map": (["--map", "willow_garage_ofice"], ["unknown map", "did you mean 'willow_garage_office'"]),
     "map file": (["--map", "nowhere.yaml"], ["nowhere.yaml", "No such file"]),
     "robots": (["--robots", "0"], ["robots", "greater than or equal to 1"]),
-    "limit": (["--limit", "-1"], ["limit_s", "greater than 0"]),
+    "limit": (["--limit", "-1"], ["limit_s", "greater than or equal to 0.001"]),
     "no file": (["nowhere.yaml"], ["nowhere.yaml", "No such file"]),
     "body": (["--set", "robot.half_width_m=2"], ["robot.half_width_m"]),
 }

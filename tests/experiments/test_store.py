@@ -10,7 +10,7 @@ import pytest
 from small_experiment import small
 
 from swarmscope.errors import InputFileError, SwarmscopeError
-from swarmscope.experiments.campaign import keyed_units
+from swarmscope.experiments.campaign import keyed_units, state_of
 from swarmscope.experiments.store import Store
 from swarmscope.experiments.work import finished, make_job, work, world_key
 from swarmscope.scenarios.to_kernels import complete
@@ -162,3 +162,30 @@ def test_nowhere_to_write(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(SwarmscopeError, match="file"):
         Store(tmp_path / "file" / "s.sqlite")
+
+
+def test_damaged_rows_are_named_set_aside_and_run_again(tmp_path, answers):
+    path = tmp_path / "s.sqlite"
+    units = keyed_units(small())
+    with Store(path) as store:
+        for answer in answers:
+            store.add(answer)
+    keys = [answer.key for answer in answers]
+    with sqlite3.connect(path) as opened:
+        opened.execute("UPDATE runs SET robots = '{\"travelled_m\": [1' WHERE key = ?", (keys[0],))
+        opened.execute("UPDATE runs SET spl = 'much' WHERE key = ?", (keys[1],))
+        opened.execute("UPDATE worlds SET shortest = '[]'")
+    opened.close()
+    with Store(path, create=False) as store:
+        state = state_of(small(), store)
+        assert state.damaged == {keys[0]: "robots is no JSON", keys[1]: "spl is no number"}
+        assert state.done == {keys[2]} and {key for _, key in state.missing} >= set(keys[:2])
+        assert [run.key for run in store.runs(units)] == [key for _, key in units if key == keys[2]]
+        assert store.references(answers[0].world) is None
+        store.set_aside(state.damaged)
+        assert state_of(small(), store).damaged == {}
+        store.add(answers[0])
+        assert store.done(keys) == {keys[0], keys[2]}
+    with sqlite3.connect(path) as opened:
+        assert dict(opened.execute("SELECT key, why FROM damaged")) == state.damaged
+    opened.close()

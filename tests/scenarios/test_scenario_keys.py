@@ -57,7 +57,7 @@ def test_a_complete_scenario_holds_the_keys_that_are_listed():
 
 def test_units_and_bounds_are_read_off():
     keys = {key.name: key for key in scenario_keys()}
-    assert keys["robot.a_max_mps2"].unit == "m/s²" and keys["robot.radius_m"].takes == "number > 0"
+    assert keys["robot.a_max_mps2"].unit == "m/s²" and keys["robot.radius_m"].takes == "number ≥ 0.001, ≤ 100"
     assert keys["lidar.beams"].takes == "whole number ≥ 8, ≤ 4096"
     assert keys["record_scans"].takes == "auto, yes, no" and keys["radio.bitrate_bps"].unit == "bit/s"
     assert keys["place.starts"].default == MUST and keys["place.world.obstacles"].default == []

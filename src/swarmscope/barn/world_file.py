@@ -14,8 +14,10 @@ from xml.etree.ElementTree import Element, ParseError
 import numpy as np
 from numpy.typing import NDArray
 
+from swarmscope.bounds import number_of
 from swarmscope.errors import InputFileError
 from swarmscope.sim.maps.gazebo import parse_xml
+from swarmscope.texts import check_regular
 
 MOST_BYTES = 32 << 20
 """Larger files are refused; the challenge's have half a megabyte."""
@@ -42,12 +44,9 @@ def read_world_file(path: Path) -> NDArray[np.float64]:
 
 
 def _tree(path: Path) -> Element:
-    with path.open("rb") as file:
-        text = file.read(MOST_BYTES + 1)
-    if len(text) > MOST_BYTES:
-        raise _Bad(f"is larger than {MOST_BYTES >> 20} MiB")
+    check_regular(path, MOST_BYTES)
     try:
-        return parse_xml(text.decode("utf-8", "replace"))
+        return parse_xml(path.read_bytes().decode("utf-8", "replace"))
     except ValueError as why:
         raise _Bad(str(why)) from None
 
@@ -102,10 +101,7 @@ def _pose(at: Element, where: str) -> list[float]:
 
 def _numbers(text: str | None, count: int, where: str) -> list[float]:
     words = (text or "").split()
-    try:
-        values = [float(word) for word in words]
-    except ValueError:
-        values = []
+    values = [number_of(word) for word in words]
     if len(values) != count or not all(map(math.isfinite, values)):
         raise _Bad(f"{where} must be {count} finite number{'s' * (count > 1)}, not '{' '.join(words)[:60]}'")
     return values

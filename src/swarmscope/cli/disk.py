@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
@@ -27,13 +28,25 @@ from swarmscope.disk.runs import Film, Problem, problem
 from swarmscope.disk.stalls import Situation, basins, describe
 from swarmscope.disk.study import table
 from swarmscope.disk.study.batches import Choice, Report, play_all, play_batch, read_choice
-from swarmscope.disk.study.figures import Played, Row, csv_text, ended_words, failures, played, row, rows_by_map
+from swarmscope.disk.study.figures import (
+    Played,
+    Row,
+    collided,
+    csv_text,
+    ended_words,
+    failures,
+    played,
+    row,
+    rows_by_map,
+)
 from swarmscope.errors import ConfigError
 from swarmscope.experiments.seeds import seed_set
 from swarmscope.judging.provenance import own_revision, versions
 from swarmscope.scenarios.keys import docs_of
 from swarmscope.viewing.report.publish import put_in_place
 
+COLLIDED = 1
+"""Exit code when some run ended by contact, or without a valid velocity."""
 SHOWN_FAILURES = 8
 PICTURES = 1500
 """A film has about so many pictures."""
@@ -44,12 +57,18 @@ SLOW_S = 300.0
 
 
 def run_command(
-    names: Sequence[str], map_: str, permutation: str | None, robots: int | None, radius: float | None, out: Path | None
+    names: Sequence[str],
+    map_: str,
+    permutation: str | None,
+    robots: int | None,
+    radius: float | None,
+    out: Path | None,
+    call_s: float = user.CALL_S,
 ) -> None:
     """Play one run with each controller, print how it went, write pictures and a replay page."""
     from swarmscope.disk.study import pictures, replay
 
-    choices = read_choices(names)
+    choices = read_choices(names, call_s)
     of = one_problem(map_, permutation, robots, radius)
     of_permutation = "".join(str(k) for k in of.permutation[0]) if of.rules.n <= 10 else "many"
     place = out or Path("runs") / "disk" / f"{file_stem(of.maps[0].name)}-{of_permutation}"
@@ -78,13 +97,19 @@ def run_command(
         contents["replay.html"] = replay.replay_page(of, shown, int(least[0])).encode()
     results.save([all_played], contents)
     results.print_names()
+    _end(all_played)
 
 
 def table_command(
-    names: Sequence[str], map_names: Sequence[str], permutations: Sequence[str], out: Path, workers: int | None
+    names: Sequence[str],
+    map_names: Sequence[str],
+    permutations: Sequence[str],
+    out: Path,
+    workers: int | None,
+    call_s: float = user.CALL_S,
 ) -> None:
     """Play all permutations on the maps with each controller and compare them as Table 1 of the report does."""
-    choices = read_choices(names)
+    choices = read_choices(names, call_s)
     rules = Rules()
     chosen = [read_permutation(text, rules.n) for text in permutations] or list(all_permutations(rules.n))
     of = problem(rules, [find_map(name, rules) for name in map_names or maps.REPORT_MAPS], chosen)
@@ -105,13 +130,20 @@ def table_command(
     print_table(all_rows, "steps until all have arrived", len(chosen) == math.factorial(rules.n))
     print_failures(group)
     results.print_names()
+    _end(group)
 
 
 def random_command(
-    names: Sequence[str], robots: Sequence[int], seeds: str, count: int | None, out: Path, workers: int | None
+    names: Sequence[str],
+    robots: Sequence[int],
+    seeds: str,
+    count: int | None,
+    out: Path,
+    workers: int | None,
+    call_s: float = user.CALL_S,
 ) -> None:
     """Play random maps with each controller: how many arrive, how far from the bound, and that nobody collides."""
-    choices = read_choices(names)
+    choices = read_choices(names, call_s)
     chosen = seed_set(seeds)[:count]
     options = [word for n in robots for word in ("--robots", str(n))]
     options += ["--seeds", seeds, "--maps", str(len(chosen))]
@@ -135,15 +167,29 @@ def random_command(
             print(f"{entry.controller}: {share.estimate:.2%} arrive (95 %: {share.low:.2%} to {share.high:.2%})")
         print_failures(group)
     results.print_names()
+    _end([one for group in done for one in group])
+
+
+def _end(all_played: Sequence[Played]) -> None:
+    """End with another exit code than 0 if some run ended by contact."""
+    if any(map(collided, all_played)):
+        raise typer.Exit(COLLIDED)
 
 
 def field_command(
-    name: str, map_: str, permutation: str | None, robot: int, alone: bool, resolution: int | None, out: Path | None
+    name: str,
+    map_: str,
+    permutation: str | None,
+    robot: int,
+    alone: bool,
+    resolution: int | None,
+    out: Path | None,
+    call_s: float = user.CALL_S,
 ) -> None:
     """Draw the field of one robot's velocities, and say where robots get stuck in it."""
     from swarmscope.disk.study import pictures
 
-    choice = read_choice(name)
+    choice = read_choice(name, call_s)
     if choice.name == "planned":
         raise ConfigError(name, "follows a plan in time, so it has no field; draw another, or a run of it")
     of = one_problem(map_, permutation, None, None)
@@ -206,9 +252,9 @@ def one_problem(map_: str, permutation: str | None, robots: int | None, radius: 
     return of
 
 
-def read_choices(names: Sequence[str]) -> list[Choice]:
+def read_choices(names: Sequence[str], call_s: float) -> list[Choice]:
     """Return the controllers of a command line, which have to differ in name. Errors: those of ``read_choice``."""
-    choices = [read_choice(name) for name in names]
+    choices = [read_choice(name, call_s) for name in names]
     twice = first_twice([choice.label for choice in choices])
     if twice is not None:
         raise ConfigError(twice, "two controllers have this name; name each once, and give files different names")

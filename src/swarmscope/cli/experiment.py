@@ -92,6 +92,9 @@ def status_command(file: str, maps: int | None, store: Path | None) -> None:
         health = results.check()
         print(f"{place}: {len(state.done)} done, {len(state.failed)} failed, {missing} missing; file {health}")
         _print_errors(state)
+        _print_damage(state, place)
+    if state.damaged or health != "ok":
+        raise typer.Exit(FAILED)
 
 
 def report_command(file: str, maps: int | None, store: Path | None, out: Path | None, code: bool = True) -> None:
@@ -100,7 +103,11 @@ def report_command(file: str, maps: int | None, store: Path | None, out: Path | 
     _code_in(experiment, code)
     place = store_path(experiment, store)
     with Store(place, create=False) as results:
-        write(experiment, results, state_of(experiment, results, maps), place, out, run_files=False)
+        state = state_of(experiment, results, maps)
+        write(experiment, results, state, place, out, run_files=False)
+        _print_damage(state, place)
+    if state.damaged:
+        raise typer.Exit(FAILED)
 
 
 def export_command(file: str, csv: Path, store: Path | None) -> None:
@@ -186,6 +193,15 @@ def _print_errors(state: State) -> None:
         print(f"failed: {unit.place}, {unit.planner}, seed {unit.seed}: {state.failed[key]}", file=sys.stderr)
     if len(state.failed) > MOST_ERRORS:
         print(f"... and {len(state.failed) - MOST_ERRORS} more", file=sys.stderr)
+
+
+def _print_damage(state: State, place: Path) -> None:
+    for key in list(state.damaged)[:MOST_ERRORS]:
+        unit = next(u for u, k in state.units if k == key)
+        why = f"{unit.place}, {unit.planner}, seed {unit.seed}: {state.damaged[key]}"
+        print(f"{place}: damaged row: {why}; 'resume' sets it aside and runs it again", file=sys.stderr)
+    if len(state.damaged) > MOST_ERRORS:
+        print(f"... and {len(state.damaged) - MOST_ERRORS} more", file=sys.stderr)
 
 
 def _cells(units: list[Keyed]) -> dict[tuple[str, str], list[Keyed]]:

@@ -5,11 +5,10 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import yaml
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
@@ -17,6 +16,7 @@ from rich.table import Table
 from swarmscope.cli._console import PlainConsole
 from swarmscope.errors import ConfigError, MissingExtraError
 from swarmscope.learning.generate import DRIVEN, PLACED, generate, totals, verify
+from swarmscope.scenarios.overrides import read_value
 
 RADII_SAMPLES = 4_000
 """Samples of each set on which networks are scored for every radius."""
@@ -246,13 +246,7 @@ def read_changes(changes: Sequence[str]) -> dict[str, Any]:
         key, equals, value = text.partition("=")
         if not equals or not key:
             raise ConfigError("--set", f"'{text}' is not KEY=VALUE")
-        try:
-            found[key] = yaml.safe_load(value)
-        except yaml.YAMLError:
-            raise ConfigError("--set", f"'{value}' is no value") from None
-        if isinstance(found[key], str):
-            with suppress(ValueError):
-                found[key] = float(found[key])  # YAML 1.1 takes 1e-3 for text
+        found[key] = read_value(value, text)
     return found
 
 

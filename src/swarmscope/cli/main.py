@@ -45,11 +45,12 @@ Controllers = Annotated[
     ),
 ]
 DiskMap = Annotated[str, typer.Option("--map", help="c0, u, crevice, one-disc, minima, empty, random:SEED, FILE.yaml.")]
+CallLimit = Annotated[float, typer.Option(min=0.001, max=86400.0, help="Seconds for a call of your controller.")]
 Permutation = Annotated[str | None, typer.Option(help="Goals of robots 0, 1, ...: 0,3,1,4,2. Else 0,1,2,...")]
 ExperimentFile = Annotated[str, typer.Argument(metavar="FILE", help="Experiment file (YAML), or a shipped one's name.")]
 Maps = Annotated[int | None, typer.Option(min=1, help="Only the first so many seeds (the papers have 20; GIWT 500).")]
 EngineName = Annotated[str, typer.Option(help="in-process, local (processes) or ray (machines).")]
-Workers = Annotated[int | None, typer.Option(min=1, help="Processes, else one for each core.")]
+Workers = Annotated[int | None, typer.Option(min=1, max=1024, help="Processes, else one a core.")]
 Address = Annotated[str | None, typer.Option(help="Of a Ray cluster; 'auto' for the one this machine belongs to.")]
 StorePath = Annotated[Path | None, typer.Option(help="File with the results, else runs/<name>/results.sqlite.")]
 ReportOut = Annotated[Path | None, typer.Option(help="Folder of the report, else runs/<name>/report.")]
@@ -229,6 +230,7 @@ def replay(
     close: Close = False,
 ) -> None:
     """Make the replay page and the picture of a run folder anew."""
+    from swarmscope.user_files import whole_path
     from swarmscope.viewing.pictures import write_picture
     from swarmscope.viewing.replay import write_replay
 
@@ -236,7 +238,7 @@ def replay(
     typer.echo(str(write_picture(run_dir, close)))
     typer.echo(str(page))
     if open_:
-        typer.launch(page.resolve().as_uri())
+        typer.launch(whole_path(page).as_uri())
 
 
 @app.command(
@@ -327,7 +329,9 @@ def barn(
     "[bold]swarmscope storm --replay runs/storm/breach-3-117.yaml[/bold]"
 )
 def storm(
-    minutes: Annotated[float | None, typer.Option(min=0.0, help="No run begins later; else 1 without --runs.")] = None,
+    minutes: Annotated[
+        float | None, typer.Option(min=0.0, max=1e6, help="No run begins later; else 1 without --runs.")
+    ] = None,
     runs: Annotated[int | None, typer.Option(min=1, help="Not more runs than these.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of everything that is drawn, with the number of a run.")] = 0,
     into: Annotated[Path | None, typer.Option(help="JSON file that adds storms up; its runs are skipped.")] = None,
@@ -497,11 +501,12 @@ def disk_run(
         float | None, typer.Option(help="Their radius; by default they cover as much as 5 of 0.05.")
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder, else runs/disk/<map>-<permutation>.")] = None,
+    call_limit: CallLimit = 10.0,
 ) -> None:
     """Play one run with one or several controllers; pictures and a replay page."""
     from swarmscope.cli.disk import run_command
 
-    run_command(controller or ["reactive"], map_, permutation, robots, radius, out)
+    run_command(controller or ["reactive"], map_, permutation, robots, radius, out, call_limit)
 
 
 @disk.command(
@@ -517,11 +522,12 @@ def disk_table(
     permutation: Annotated[list[str] | None, typer.Option(help="Permutation; repeatable. Else all 120.")] = None,
     out: Annotated[Path, typer.Option(help="Folder of page, figures and runs.")] = Path("runs/disk/table"),
     workers: Workers = None,
+    call_limit: CallLimit = 10.0,
 ) -> None:
     """Play all 600 runs and print the report's Table 1 beside ours and the bound."""
     from swarmscope.cli.disk import table_command
 
-    table_command(controller or ["report"], map_ or [], permutation or [], out, workers)
+    table_command(controller or ["report"], map_ or [], permutation or [], out, workers, call_limit)
 
 
 @disk.command(
@@ -537,11 +543,12 @@ def disk_random(
     seeds: Annotated[str, typer.Option(help="Set of seeds or range.")] = "disk-evaluation",
     out: Annotated[Path, typer.Option(help="Folder of page, figures and runs.")] = Path("runs/disk/random"),
     workers: Workers = None,
+    call_limit: CallLimit = 10.0,
 ) -> None:
     """Play random maps with traps and narrow passages."""
     from swarmscope.cli.disk import random_command
 
-    random_command(controller or ["reactive"], robots or [5], seeds, maps, out, workers)
+    random_command(controller or ["reactive"], robots or [5], seeds, maps, out, workers, call_limit)
 
 
 @disk.command(
@@ -560,11 +567,12 @@ def disk_field(
     ] = False,
     resolution: Annotated[int | None, typer.Option(min=5, max=401, help="Points along each side.")] = None,
     out: Annotated[Path | None, typer.Option(help="PNG file.")] = None,
+    call_limit: CallLimit = 10.0,
 ) -> None:
     """Draw where a robot would go from anywhere, and where it would get stuck."""
     from swarmscope.cli.disk import field_command
 
-    field_command(controller, map_, permutation, robot, alone, resolution, out)
+    field_command(controller, map_, permutation, robot, alone, resolution, out, call_limit)
 
 
 @disk.command("start", epilog="Example: [bold]swarmscope disk start mine.py[/bold]")
@@ -593,7 +601,7 @@ def disk_list() -> None:
 def giwt_data(
     data: GiwtData = Path("runs/giwt/data"),
     set_of: GiwtSets = None,
-    samples: Annotated[int, typer.Option(min=1, help="Of each set, at least.")] = 100_000,
+    samples: Annotated[int, typer.Option(min=1, max=10**9, help="Of each set, at least.")] = 100_000,
     workers: Workers = None,
     check: Annotated[bool, typer.Option("--check", help="Only check every shard's checksum.")] = False,
 ) -> None:
@@ -642,7 +650,8 @@ def giwt_eval(
     set_of: GiwtSets = None,
     split: Annotated[str, typer.Option(help="train, validation or test.")] = "test",
     radius: Annotated[
-        list[float] | None, typer.Option(min=0.1, help="Also score robots that see only so far, metres; several times.")
+        list[float] | None,
+        typer.Option(min=0.1, max=1000.0, help="Score robots that see only so far, m, too; repeatable."),
     ] = None,
     out: Annotated[Path | None, typer.Option(help="JSON file for all figures.")] = None,
     pictures: Annotated[Path | None, typer.Option(help="Folder for pictures of layers and of radii.")] = None,
@@ -657,7 +666,7 @@ def giwt_eval(
 def giwt_ceiling(
     data: GiwtData = Path("runs/giwt/data"),
     set_of: GiwtSets = None,
-    view: Annotated[float, typer.Option(min=0.1, help="Radius seen, metres.")] = 5.0,
+    view: Annotated[float, typer.Option(min=0.1, max=1000.0, help="Radius seen, metres.")] = 5.0,
 ) -> None:
     """Show how often the expert's sides differ between samples that look alike."""
     from swarmscope.cli.giwt import ceiling_command

@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from swarmscope.api import add_pictures
+from swarmscope.bounds import number_of
 from swarmscope.cli._code import announce, files_of, refuse_code
 from swarmscope.cli._console import PlainConsole
 from swarmscope.errors import ConfigError
@@ -123,10 +124,7 @@ def _set_option(values: dict[str, Any], key: str, value: Any) -> None:
 
 def _read_place(text: str, option: str, most: int) -> list[float]:
     """Return x, y [m] and what may follow, degrees in radians."""
-    try:
-        numbers = [float(part) for part in text.split(",")]
-    except ValueError:
-        numbers = []
+    numbers = [number_of(part) for part in text.split(",")]
     if not 2 <= len(numbers) <= most or not np.isfinite(numbers).all():
         raise ConfigError(f"{option} {text}", "must look like X,Y" + (" or X,Y,DEG" if most > 2 else ""))
     return [*numbers[:2], *np.radians(numbers[2:]).tolist()]

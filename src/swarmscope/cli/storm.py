@@ -26,7 +26,7 @@ from swarmscope.storm.play import Played, Storm, code_of, watched
 from swarmscope.storm.runs import Until, rage, shrink_all, usual_planners
 from swarmscope.storm.shrink import shrink
 from swarmscope.storm.tally import Piece, Sum, Tally, add_up, read_tally
-from swarmscope.user_files import is_file_name, short_name
+from swarmscope.user_files import is_file_name, short_name, whole_path
 from swarmscope.viewing.report.publish import put_in_place
 
 BROKEN = 1
@@ -135,13 +135,13 @@ def _slowest(total: Sum) -> str:
 def _checked(planners: Sequence[str], code: bool) -> list[str]:
     """Return the planners, users' files by their full names. Errors: those of names, files and libraries."""
     found = list(planners) or usual_planners()
-    files = [Path(name).resolve() for name in found if is_file_name(name)]
+    files = [whole_path(name) for name in found if is_file_name(name)]
     if not code:
         refuse_code(files)
     announce(files)
     for name in found:
         load_planner(name).check_available()
-    return [str(Path(name).resolve()) if is_file_name(name) else name for name in found]
+    return [str(whole_path(name)) if is_file_name(name) else name for name in found]
 
 
 def _read(into: Path | None) -> Tally:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from swarmscope.bounds import number_of
 from swarmscope.disk.rules import Floats
 from swarmscope.errors import InputFileError
 from swarmscope.texts import read_yaml
@@ -89,9 +90,9 @@ def _obstacle(path: Path, k: int, entry: Any) -> tuple[float, float, float]:
     try:
         if not isinstance(center, list):
             raise TypeError
-        x, y = (float(part) for part in center)
-        radius = float(entry["radius"])
-    except (TypeError, ValueError, OverflowError):
+        x, y = map(number_of, center)
+        radius = number_of(entry["radius"])
+    except (TypeError, ValueError):
         raise InputFileError(path, f"{where}: 'center' has to be two numbers, 'radius' one") from None
     if not np.isfinite([x, y, radius]).all() or radius <= 0.0:
         raise InputFileError(path, f"{where}: numbers have to be finite and the radius above 0")

@@ -42,12 +42,12 @@ class Rules:
 
     def __post_init__(self) -> None:
         for field in fields(self):
-            _check_number(field.name, getattr(self, field.name))
+            _check_number("radius" if field.name == "r" else field.name, getattr(self, field.name))
         if self.n > MOST_ROBOTS:
             raise ConfigError("n", f"{self.n} robots; at most {MOST_ROBOTS}")
         if self.n > 1 and 2.0 * self.r >= spacing(self.n):
             raise ConfigError(
-                "r",
+                "radius",
                 f"{self.n} robots of radius {self.r:g} overlap at their starts, which are {spacing(self.n):.4g} apart",
             )
         if self.step >= self.r:

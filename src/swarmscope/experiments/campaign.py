@@ -29,6 +29,8 @@ class State(NamedTuple):
     units: list[Keyed]
     done: set[str]
     failed: dict[str, str]
+    damaged: dict[str, str]
+    """What is wrong with rows of the store that cannot be read: their units are missing."""
 
     @property
     def missing(self) -> list[Keyed]:
@@ -52,7 +54,9 @@ def state_of(experiment: Experiment, store: Store, maps: int | None = None) -> S
     found = keyed_units(experiment, maps)
     keys = {key for _, key in found}
     done = store.done(keys)
-    return State(found, done, store.failed(keys - done))
+    damaged = store.damaged(done)
+    done -= damaged.keys()
+    return State(found, done, store.failed(keys - done), damaged)
 
 
 def run_missing(
@@ -75,6 +79,10 @@ def run_missing(
     todo = {key: unit for unit, key in wanted}  # two labels may name the same run
     if not todo:
         return state
+    if state.damaged:
+        store.set_aside(state.damaged)
+        if say is not None:
+            say(f"{len(state.damaged)} damaged row(s) of the store set aside (table 'damaged'); they are run again")
     _check_available([unit.scenario for unit in todo.values()])
     _warm_up({unit.scenario.planner.name for unit in todo.values()}, engine, say)
     order = list(todo)

@@ -199,7 +199,12 @@ def parse_experiment(values: Any, where: str) -> Experiment:
         experiment = Experiment.model_validate(values)
     except ValidationError as error:
         raise _first_problem(error, where) from None
-    seeds = seed_set(experiment.seeds)
+    try:
+        seeds = seed_set(experiment.seeds)
+    except ConfigError as error:
+        raise ConfigError(f"{where}: {error.where}", error.why) from None
+    except UnknownNameError as error:
+        raise UnknownNameError(error.kind, error.name, error.valid, f"{where}: seeds") from None
     for place, planner, keys in _variants(experiment):
         parse_scenario(keys | {"seed": seeds[0]}, f"{where}: {place}, {planner}")
     return experiment

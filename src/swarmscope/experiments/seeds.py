@@ -15,7 +15,7 @@ VERSION = 1
 LARGEST = 2**31 - 1  # a scenario's seed
 MOST = 100_000  # seeds of one list: more are taken for a slip
 
-_RANGE = re.compile(r"(\d+)(?:\s*-\s*(\d+))?")
+_RANGE = re.compile(r"([0-9]+)(?:\s*-\s*([0-9]+))?")
 
 
 class SeedSet(NamedTuple):

@@ -8,7 +8,7 @@ disk: SQLite's log needs shared memory, which network file systems lack; on a cl
 
 Tables: ``runs`` (one row per content key: configuration, a column per figure, per-robot lists), ``cells`` (which run
 is which place, planner and seed of which experiment), ``worlds`` (reference ways), ``failures`` (units that raised),
-and the view ``results`` that joins cells and runs.
+``damaged`` (rows that could not be read, kept aside), and the view ``results`` that joins cells and runs.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ from swarmscope.experiments.experiment import Unit
 from swarmscope.experiments.results import Run
 from swarmscope.experiments.work import MEASURED, Finished
 from swarmscope.judging.metrics import COUNTED, METRICS
+from swarmscope.texts import check_regular
 
 APPLICATION = 0x73776D73  # "swms"
 VERSION = 1
@@ -36,6 +37,8 @@ BUSY_S = 60.0
 """How long a writer waits for another one."""
 FIGURES = tuple(dict.fromkeys([*(m.name for m in (*METRICS, *COUNTED)), *MEASURED]))
 TEXTS = ("config", "robots", "failures", "cases", "digest", "git", "code", "swarmscope", "python", "numpy", "numba")
+JSON = ("config", "robots", "failures", "cases")
+PER_ROBOT = ("travelled_m", "shortest_m", "arrival_s")
 SCHEMA = f"""
 CREATE TABLE IF NOT EXISTS runs (
     key TEXT PRIMARY KEY, world TEXT NOT NULL, planner_name TEXT, seed INTEGER, created TEXT DEFAULT CURRENT_TIMESTAMP,
@@ -62,6 +65,8 @@ class Store:
         self.path = Path(path)
         if not create and not self.path.exists():
             raise InputFileError(self.path, "no such store; nothing has been run into it yet")
+        if self.path.exists():
+            check_regular(self.path, None)
         with self._explained():
             if create:
                 self.path.parent.mkdir(parents=True, exist_ok=True)
@@ -139,19 +144,40 @@ class Store:
         return found
 
     def references(self, world: str) -> dict[str, Any] | None:
-        """Return the reference ways of a world, if some run has found them."""
+        """Return the reference ways of a world, if some run has found them and they are sound."""
         with self._explained():
             row = self._db.execute("SELECT shortest FROM worlds WHERE world = ?", (world,)).fetchone()
-            return None if row is None else json.loads(row[0])
+        return None if row is None else _sound_references(row[0])
 
     def runs(self, units: Iterable[tuple[Unit, str]]) -> Iterator[Run]:
-        """Return the finished runs among the units."""
-        names = ", ".join(("config", "robots", "failures", "cases", *FIGURES))
+        """Return the finished runs among the units, without damaged ones."""
         with self._explained():
             for unit, key in units:
-                row = self._db.execute(f"SELECT {names} FROM runs WHERE key = ?", (key,)).fetchone()
-                if row is not None:
+                row = self._db.execute(f"SELECT {_read()} FROM runs WHERE key = ?", (key,)).fetchone()
+                if row is not None and not _fault(row):
                     yield _as_run(unit, key, row)
+
+    def damaged(self, keys: Iterable[str]) -> dict[str, str]:
+        """Return what is wrong with those of ``keys`` whose rows are damaged."""
+        found = {}
+        with self._explained():
+            for key in keys:
+                row = self._db.execute(f"SELECT {_read()} FROM runs WHERE key = ?", (key,)).fetchone()
+                if row is not None and (why := _fault(row)):
+                    found[key] = why
+        return found
+
+    def set_aside(self, rows: Mapping[str, str]) -> None:
+        """Move damaged rows, by key, into the table ``damaged``, so that they are run again and nothing is lost."""
+        with self._explained(), self._transaction():
+            self._db.execute("CREATE TABLE IF NOT EXISTS damaged AS SELECT *, '' AS why FROM runs WHERE 0")
+            kept = [row[1] for row in self._db.execute("PRAGMA table_info(damaged)")]
+            there = {row[1] for row in self._db.execute("PRAGMA table_info(runs)")}
+            names = ", ".join(name for name in kept if name in there)
+            for key, why in rows.items():
+                copy = f"INSERT INTO damaged ({names}, why) SELECT {names}, ? FROM runs WHERE key = ?"
+                self._db.execute(copy, (why, key))
+                self._db.execute("DELETE FROM runs WHERE key = ?", (key,))
 
     def count(self) -> int:
         """Return the number of results."""
@@ -287,8 +313,53 @@ def _as_run(unit: Unit, key: str, row: tuple[Any, ...]) -> Run:
         figures=dict(zip(FIGURES, row[4:], strict=True)),
         failures=failures,
         cases=cases,
-        **{name: _array(robots, name) for name in ("travelled_m", "shortest_m", "arrival_s")},
+        **{name: _array(robots, name) for name in PER_ROBOT},
     )
+
+
+def _read() -> str:
+    """Return the columns that a run is read from."""
+    return ", ".join((*JSON, *FIGURES))
+
+
+def _fault(row: tuple[Any, ...]) -> str:
+    """Return what is wrong with a row of ``_read``, an empty string if nothing is."""
+    for name, text in zip(JSON, row, strict=False):
+        try:
+            value = json.loads(text)
+        except (ValueError, TypeError, RecursionError):
+            return f"{name} is no JSON"
+        if not (_is_per_robot(value) if name == "robots" else _is_of(value, name)):
+            return f"{name} does not hold what it should"
+    odd = [name for name, value in zip(FIGURES, row[len(JSON) :], strict=True) if not _is_number(value)]
+    return f"{odd[0]} is no number" if odd else ""
+
+
+def _is_of(value: Any, name: str) -> bool:
+    if name == "config":
+        return isinstance(value, dict)
+    return isinstance(value, list) and all(isinstance(entry, dict) for entry in value)
+
+
+def _is_per_robot(value: Any) -> bool:
+    """Tell whether this holds a number or None for each robot under every name."""
+    lists = [value.get(name) for name in PER_ROBOT] if isinstance(value, dict) else []
+    sizes = {len(one) for one in lists if isinstance(one, list) and all(map(_is_number, one))}
+    return len(sizes) == 1 and all(isinstance(one, list) and len(one) in sizes for one in lists)
+
+
+def _is_number(value: Any) -> bool:
+    return value is None or (isinstance(value, int | float) and not isinstance(value, bool))
+
+
+def _sound_references(text: Any) -> dict[str, Any] | None:
+    """Return the reference ways that a row holds, None if it is damaged: they are found again."""
+    with suppress(ValueError, TypeError, RecursionError):
+        found = json.loads(text)
+        lists = [found[name] for name in ("shortest_m", "any_angle_m")]
+        if all(isinstance(one, list) and all(map(_is_number, one)) for one in lists) and _is_number(found["wall_s"]):
+            return dict(found)
+    return None
 
 
 def _array(robots: Mapping[str, list[float | None]], name: str) -> np.ndarray:

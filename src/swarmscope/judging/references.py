@@ -14,7 +14,7 @@ from swarmscope.tasks import Setup
 ANY_ANGLE_ROBOTS = 50
 """With more robots the any-angle reference, which takes longer than the run, is left out."""
 SEARCHED_M2 = 1e6
-"""Sum of (start to goal)^2 over the robots that get an A* reference: some 5 s of search."""
+"""Sum of (start to goal)^2 over the robots that get an A* reference: some 5 s of search. Who has far more gets none."""
 
 
 class References(NamedTuple):
@@ -37,7 +37,7 @@ def reference_ways(setup: Setup, radius: float | Sequence[float], any_angle: boo
     robots = len(setup.starts)
     begun = time.perf_counter()
     chosen = _with_reference(setup)
-    ways = grid_paths(setup.world, setup.starts[chosen], setup.goals[chosen], radius)
+    ways = grid_paths(setup.world, setup.starts[chosen], setup.goals[chosen], radius) if chosen.size else []
     wall_s = time.perf_counter() - begun
     shortest, best = np.full((2, robots), np.nan)
     shortest[chosen] = lengths_m(ways)
@@ -62,4 +62,6 @@ def _with_reference(setup: Setup) -> np.ndarray:
     robots = len(setup.starts)
     apart = setup.goals - setup.starts[:, :2]
     share = min(1.0, SEARCHED_M2 / max(1.0, float((apart * apart).sum())))
-    return np.unique(np.linspace(0, robots - 1, max(1, int(share * robots))).astype(int))
+    chosen: np.ndarray = np.unique(np.linspace(0, robots - 1, max(1, int(share * robots))).astype(int))
+    near: np.ndarray = (apart[chosen] ** 2).sum(axis=1) <= 4.0 * SEARCHED_M2
+    return np.asarray(chosen[near])

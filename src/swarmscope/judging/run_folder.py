@@ -25,6 +25,8 @@ import yaml
 from swarmscope.errors import ConfigError, InputFileError, SwarmscopeError
 from swarmscope.scenarios.plain import plain
 from swarmscope.sim.scan_files import read_npz
+from swarmscope.texts import load_yaml, read_text
+from swarmscope.user_files import whole_path
 
 CONFIG, WORLD, TRAJECTORY, METRICS = "config.yaml", "world.json", "trajectory.npz", "metrics.json"
 REQUIRED = frozenset({CONFIG, WORLD, TRAJECTORY, METRICS})
@@ -34,6 +36,8 @@ ASKED_FILES = frozenset({"run.mcap", "video.gif", "video.mp4"})
 USER_FILES = frozenset({"planner.py", "task.py"})
 """Copies of a user's files that were run; nothing runs them again."""
 YAML_END = "...\n"
+MOST_BYTES = 1 << 30
+"""Of a text in a run folder."""
 LEFTOVER = re.compile(r"\..+\.\d+\.tmp")
 """What a killed ``swarmscope replay`` may leave in a run folder."""
 
@@ -78,10 +82,22 @@ def check_out(out: Path) -> Path:
     """
     place = _place(out)
     with _explained(place):
+        _refuse_impossible(place)
         if place.parent.is_dir():
             with _locked(place.parent):
                 _refuse_foreign(place)
     return place
+
+
+def _refuse_impossible(place: Path) -> None:
+    """Raise ``ConfigError`` where no folder can be made: in what is none, or in place of a link that leads nowhere."""
+    if place.is_symlink():
+        raise ConfigError(str(place), "is a link that leads nowhere, or in a circle")
+    there = next(above for above in place.parents if os.path.lexists(above))
+    if not there.is_dir():
+        raise ConfigError(str(place), f"cannot be made: {there} is no folder")
+    if not os.access(there, os.W_OK | os.X_OK):
+        raise ConfigError(str(place), f"cannot be made: {there} may not be written to")
 
 
 def check_same(out: Path, config: Mapping[str, Any]) -> None:
@@ -117,8 +133,8 @@ def read_config(run_dir: Path) -> dict[str, Any]:
     if not text.endswith("\n" + YAML_END):
         raise InputFileError(path, "torn: the end mark is missing")
     try:
-        return _as_mapping(path, yaml.safe_load(text))
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        return _as_mapping(path, load_yaml(text))
+    except (yaml.YAMLError, ValueError, OverflowError, RecursionError) as error:
         raise InputFileError(path, f"torn or foreign YAML ({type(error).__name__})") from None
 
 
@@ -129,7 +145,7 @@ def read_user_files(run_dir: Path) -> dict[str, str]:
 
 
 def _place(out: Path) -> Path:
-    place = Path(out).resolve()
+    place = whole_path(out)
     if not place.name:
         raise ConfigError(str(place), "is not a place for a run folder")
     return place
@@ -295,19 +311,14 @@ def _finished(run_dir: Path) -> Path:
 
 
 def _read_text(path: Path) -> str:
-    try:
-        return path.read_text(encoding="utf-8")
-    except UnicodeDecodeError:
-        raise InputFileError(path, "is not text: torn or foreign") from None
-    except OSError as error:
-        raise InputFileError(path, error.strerror or "cannot be read") from None
+    return read_text(path, MOST_BYTES)
 
 
 def _read_json(path: Path) -> dict[str, Any]:
     text = _read_text(path)
     try:
         return _as_mapping(path, json.loads(text))
-    except (ValueError, RecursionError):
+    except (ValueError, OverflowError, RecursionError):
         raise InputFileError(path, "torn or foreign JSON") from None
 
 

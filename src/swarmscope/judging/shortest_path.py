@@ -30,6 +30,7 @@ from swarmscope.tasks._search import Searcher, sift_down, sift_up
 
 RESOLUTION_M = 0.05
 WINDOW_M = 4.0  # searches look at this much around start and goal first
+MOST_CELLS = 60_000_000  # of a window; a way that needs a larger one gets no reference
 SNAP_CELLS = 3  # a start or goal in a blocked cell is taken to the nearest free one within this
 MOST_DISCS = 400  # of one tangent graph; more take the pulled way
 MOST_POINTS = 500  # of a way that is pulled taut; longer ones are thinned
@@ -160,6 +161,8 @@ class _WindowedSearch:
         margin = WINDOW_M
         while True:
             window = self._window(ends, margin)
+            if (window[2] - window[0]) * (window[3] - window[1]) > MOST_CELLS:
+                return ShortestPath(math.nan, np.zeros((0, 2)), False)
             first = np.array(window[:2])
             cells = self._searcher(window).path(ends[0] - first, ends[1] - first) + first
             whole = window == (0, 0, *self.raster.blocked.shape)

@@ -16,6 +16,7 @@ from torch import Tensor, nn
 from swarmscope.errors import ConfigError, InputFileError
 from swarmscope.learning.models import NETWORKS, Architecture, Chooser
 from swarmscope.learning.records import write_atomically
+from swarmscope.texts import check_regular
 
 FORMAT = "swarmscope-giwt-checkpoint"
 VERSION = 1
@@ -43,13 +44,14 @@ def write(path: Path, model: Chooser, about: dict[str, Any], optimizer: torch.op
 
 def read(path: Path) -> Checkpoint:
     """Return a checkpoint; raises InputFileError for what is missing, torn or of another format."""
-    if not path.is_file():
+    if not path.exists():
         raise InputFileError(path, "is not there")
+    check_regular(path, None)
     try:
         with safe_open(path, "pt") as file:
             header = json.loads((file.metadata() or {}).get("swarmscope", "{}"))
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - not a mapping
-    except (SafetensorError, OSError, ValueError) as error:
+    except (SafetensorError, OSError, ValueError, RecursionError) as error:
         raise InputFileError(path, f"is no whole safetensors file ({error})") from None
     if not isinstance(header, dict) or header.get("format") != FORMAT or header.get("version") != VERSION:
         raise InputFileError(path, f"is no '{FORMAT}' of version {VERSION}")

@@ -10,12 +10,14 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from swarmscope.errors import ConfigError, InputFileError
 from swarmscope.learning.generate import DRIVEN, PLACED, parse_set
 from swarmscope.onboard.network.model import VIEWS_M
+from swarmscope.scenarios.scenario import NUMBER
 from swarmscope.texts import read_yaml
 
 FOLDER = Path(__file__).parent.parent / "data" / "training"
-Count = Annotated[int, Field(ge=1)]
-NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+Count = Annotated[int, Field(ge=1, le=10**9), NUMBER]
+Channels = Annotated[int, Field(ge=1, le=4096), NUMBER]
+NotNegative = Annotated[float, Field(ge=0.0, le=1e6), NUMBER]
+Positive = Annotated[float, Field(gt=0.0, le=1e6), NUMBER]
 
 
 class TrainingConfig(BaseModel):
@@ -26,22 +28,22 @@ class TrainingConfig(BaseModel):
     network: Literal["giwt", "gat", "graphsage", "cnn"] = "giwt"
     sets: Annotated[list[str], Field(min_length=1)] = [*PLACED, *DRIVEN]
     """Sets of the data folder, by name."""
-    channels: tuple[Count, Count, Count] = (16, 32, 64)
+    channels: tuple[Channels, Channels, Channels] = (16, 32, 64)
     stem_stride: Literal[1, 2] = 2
     use_gain: bool = True
     use_position: bool = True
     as_printed: bool = False
     """giwt: nothing beyond (4)-(9), see learning/models.py."""
-    dropout: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.0
-    view_m: Annotated[float, Field(ge=VIEWS_M[0], le=VIEWS_M[1])] = 5.0
+    dropout: Annotated[float, Field(ge=0.0, lt=1.0), NUMBER] = 0.0
+    view_m: Annotated[float, Field(ge=VIEWS_M[0], le=VIEWS_M[1]), NUMBER] = 5.0
     """Radius of the pictures: the range of the sensor; the document has 2.5 m."""
-    shorter: Annotated[float, Field(ge=0.0, le=1.0)] = 0.25
+    shorter: Annotated[float, Field(ge=0.0, le=1.0), NUMBER] = 0.25
     """Share of the training samples in which robots see less far, 1 m to view_m: for sensors of a shorter range."""
     epochs: Count = 20
     samples_per_epoch: Count = 60_000
     """Drawn anew for every epoch; all of the training data if it holds fewer."""
     validation_samples: Count = 20_000
-    batch: Annotated[int, Field(ge=2)] = 256
+    batch: Annotated[int, Field(ge=2, le=10**6), NUMBER] = 256
     learning_rate: Positive = 1e-3
     weight_decay: NotNegative = 1e-2
     warm_up: NotNegative = 0.5
@@ -52,8 +54,8 @@ class TrainingConfig(BaseModel):
     """Stop after so many epochs without a lower validation loss."""
     precision: Literal["auto", "float32", "bfloat16"] = "auto"
     """auto: bfloat16 where the processor computes in it, float32 elsewhere; parameters are always float32."""
-    seed: Annotated[int, Field(ge=0, lt=2**31)] = 0
-    threads: Annotated[int, Field(ge=0)] = 0
+    seed: Annotated[int, Field(ge=0, lt=2**31), NUMBER] = 0
+    threads: Annotated[int, Field(ge=0, le=1024), NUMBER] = 0
     """Of the CPU, 0 for all."""
 
 
@@ -76,7 +78,7 @@ def parse_config(values: dict[str, Any], where: str) -> TrainingConfig:
         problem = error.errors()[0]
         key = ".".join(str(part) for part in problem["loc"]) or "(top)"
         what = f"unknown key; valid are {', '.join(TrainingConfig.model_fields)}"
-        why = what if problem["type"] == "extra_forbidden" else problem["msg"]
+        why = what if problem["type"] == "extra_forbidden" else str(problem["msg"]).removeprefix("Value error, ")
         raise ConfigError(f"{where}: {key}", why) from None
     for name in config.sets:
         parse_set(name)

@@ -26,6 +26,7 @@ from swarmscope.learning.records import write_atomically
 from swarmscope.onboard.network.graph import FEATURES, GRID, OWN_CELL
 from swarmscope.onboard.network.local_map import CELLS, CHANNELS
 from swarmscope.onboard.network.model import CARD, DECIDER, ENCODER, FORMAT, VERSION
+from swarmscope.texts import read_text
 
 OPSET = 18
 CLOSE = 1e-4
@@ -107,8 +108,8 @@ def export(checkpoint: Path, out: Path, card: dict[str, Any] | None = None) -> f
 def read_scores(path: Path, checkpoint: Path) -> dict[str, Any]:
     """Return what ``eval`` wrote to ``path``; raises InputFileError unless it is complete and of ``checkpoint``."""
     try:
-        scores = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+        scores = json.loads(read_text(path))
+    except (ValueError, RecursionError) as error:
         raise InputFileError(path, f"cannot be read ({error})") from None
     if not isinstance(scores, dict) or not isinstance(scores.get("sets"), dict) or "mean" not in scores:
         raise InputFileError(path, "holds no complete scores of 'swarmscope giwt eval'")

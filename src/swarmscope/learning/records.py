@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from swarmscope.errors import InputFileError
 from swarmscope.learning.scenes import Sample
+from swarmscope.texts import read_text
 
 FORMAT = "swarmscope-giwt-data"
 VERSION = 1
@@ -206,12 +207,11 @@ def write_manifest(folder: Path, manifest: dict[str, Any]) -> None:
 def read_manifest(folder: Path) -> dict[str, Any]:
     """Return the manifest of a data folder; raises InputFileError when it is missing, torn or of another format."""
     path = folder / MANIFEST
+    if not path.exists():
+        raise InputFileError(path, "is missing: the folder is no data set (see 'swarmscope giwt data --help')")
     try:
-        manifest = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        why = "is missing: the folder is no data set (see 'swarmscope giwt data --help')"
-        raise InputFileError(path, why) from None
-    except (OSError, ValueError) as error:
+        manifest = json.loads(read_text(path))
+    except (OSError, ValueError, RecursionError) as error:
         raise InputFileError(path, f"cannot be read ({error})") from None
     if not isinstance(manifest, dict) or manifest.get("format") != FORMAT:
         raise InputFileError(path, f"is not the manifest of a '{FORMAT}' folder")

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from typing import Any
 
 import yaml
 
+from swarmscope.bounds import number_of
 from swarmscope.errors import ConfigError
 from swarmscope.scenarios.plain import plain
 from swarmscope.texts import load_yaml
@@ -36,7 +37,7 @@ def set_key(values: dict[str, Any], change: str) -> None:
     path, equals, text = change.partition("=")
     if not equals or not all(path.split(".")):
         raise ConfigError(f"--set {change}", "must look like key.path=value")
-    set_path(values, path.split("."), _read(text, change), f"--set {change}")
+    set_path(values, path.split("."), read_value(text, change), f"--set {change}")
 
 
 def set_path(values: dict[str, Any], path: Sequence[str], value: Any, where: str) -> None:
@@ -60,14 +61,12 @@ def override(values: dict[str, Any], changes: Mapping[str, Any], where: str) -> 
             set_path(values, path, plain(value), f"{where}: {'.'.join(path)}")
 
 
-def _read(text: str, change: str) -> Any:
+def read_value(text: str, change: str) -> Any:
     """Return ``text`` as YAML reads it; 1e-3, which YAML 1.1 takes for text, is a number."""
     try:
         value = load_yaml(text)
     except (yaml.YAMLError, ValueError, RecursionError) as error:
         why = getattr(error, "problem", None) or "it is nested too deep, or a date that there is not"
         raise ConfigError(f"--set {change}", f"the value is not valid YAML: {why}") from None
-    if isinstance(value, str):
-        with suppress(ValueError):
-            return float(value)
-    return value
+    number = number_of(value) if isinstance(value, str) else math.nan
+    return value if math.isnan(number) else number

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,12 +15,16 @@ from swarmscope.sim.maps.gazebo import load_world
 from swarmscope.sim.maps.map_server import YAML
 from swarmscope.sim.maps.movingai import place_of
 from swarmscope.sim.maps.orion import load_maze
-from swarmscope.sim.world import Grid, WorldSpec, grid_corners
+from swarmscope.sim.world import LONGEST_M, Grid, WorldSpec, grid_corners
 from swarmscope.tasks import Setup, Wanted, check_setup, place_wanted, setup_of_task
 from swarmscope.tasks._check import Keeping, check_keeping
+from swarmscope.tasks._occupancy import domain_of
 
 if TYPE_CHECKING:  # what a scenario says elsewhere changes no place
     from swarmscope.scenarios.scenario import MapModel, Scenario
+
+MOST_M2 = 5e6
+"""Area of a world, of a box round its bounds, starts and goals."""
 
 
 def make_setup(scenario: Scenario) -> Setup:
@@ -29,11 +34,21 @@ def make_setup(scenario: Scenario) -> Setup:
     keeping = Keeping(guard.clearance_m, guard.footprint_clearance_m, scenario.lidar.range_min_m)
     if scenario.place is not None:
         setup = _written_out(scenario)
+        _check_extent(setup, "place")
         check_setup(setup, radius, keeping)
         return setup
     setup = _made(scenario)
+    _check_extent(setup, "map" if scenario.map is not None else "task")
     check_keeping(setup, radius, keeping)
     return setup
+
+
+def _check_extent(setup: Setup, key: str) -> None:
+    """Raise a ConfigError for a world that is too large to look for ways in."""
+    x0, y0, x1, y1 = domain_of(setup.world, [setup.starts, setup.goals])
+    if not (x1 - x0) * (y1 - y0) <= MOST_M2:
+        why = f"bounds, starts and goals span {x1 - x0:.0f} m x {y1 - y0:.0f} m"
+        raise ConfigError(key, f"{why}; ways are looked for on at most {MOST_M2 / 1e6:g} km²")
 
 
 def _written_out(scenario: Scenario) -> Setup:
@@ -84,6 +99,7 @@ def _on_map(scenario: Scenario, place: MapModel) -> Setup:
     wanted = Wanted(
         scenario.seed, scenario.robots, scenario.widest.radius_m, place.min_distance_m, starts, goals, each
     )
+    _check_extent(Setup(world, np.zeros((0, 3)), np.zeros((0, 2))), "map")
     return place_wanted(world, wanted)
 
 
@@ -128,12 +144,15 @@ def world_of(grid: Grid) -> WorldSpec:
     """Return the world of a map; its bounds are the box round the picture, and it is solid beyond."""
     corners = grid_corners(grid)
     (x0, y0), (x1, y1) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
+    if not np.abs(corners).max() <= LONGEST_M:
+        why = f"it reaches from ({x0:g}, {y0:g}) to ({x1:g}, {y1:g}) m, and worlds to {LONGEST_M:g} m"
+        raise ConfigError("map", f"{why}: look at the resolution and at its origin")
     return WorldSpec(obstacles=[closed(grid)], bounds=(x0, y0, x1, y1))
 
 
 def map_path(name: str) -> Path:
     """Return the file of a map: a path, or that of a map that comes with the package."""
-    return packaged_map(name) if is_packaged(name) else Path(name).expanduser()
+    return packaged_map(name) if is_packaged(name) else Path(os.path.expanduser(name))
 
 
 def is_packaged(name: str) -> bool:

@@ -9,11 +9,12 @@ from pydantic import ValidationError
 
 from swarmscope.errors import ConfigError, UnknownNameError, nearest_hint
 from swarmscope.onboard.planners import load_planner, planner_names
+from swarmscope.scenarios.costs import check_costs
 from swarmscope.scenarios.places import is_packaged
 from swarmscope.scenarios.scenario import Scenario
 from swarmscope.tasks import task_names
 from swarmscope.texts import read_yaml
-from swarmscope.user_files import is_file_name, read_code
+from swarmscope.user_files import is_file_name, read_code, whole_path
 
 REMEDIES = {"place.world.map": ": a map from a file is 'map: {file, starts, goals}' instead of 'place'"}
 """What to do about keys that people expect."""
@@ -31,6 +32,7 @@ def parse_scenario(values: Any, where: str) -> Scenario:
         scenario = Scenario.model_validate(values)
     except ValidationError as error:
         raise _first_problem(error, where) from None
+    check_costs(scenario, where)
     if scenario.task is not None:
         _check_known("task", scenario.task.name, task_names(), where)
     _check_known("planner", scenario.planner.name, planner_names(), where)
@@ -68,7 +70,7 @@ def read_scenario_file(path: Path) -> dict[str, Any]:
 def user_files_of(scenario: Scenario) -> dict[str, Path]:
     """Return the files with code of a user that running the scenario runs: of its ``planner`` and its ``task``."""
     names = {"planner": scenario.planner.name, "task": "" if scenario.task is None else scenario.task.name}
-    return {group: Path(name).resolve() for group, name in names.items() if is_file_name(name)}
+    return {group: whole_path(name) for group, name in names.items() if is_file_name(name)}
 
 
 def find_user_files(values: dict[str, Any], folder: Path) -> None:
@@ -76,7 +78,7 @@ def find_user_files(values: dict[str, Any], folder: Path) -> None:
     for group in ("planner", "task"):
         chosen = values.get(group)
         if isinstance(chosen, dict) and isinstance(chosen.get("name"), str) and is_file_name(chosen["name"]):
-            chosen["name"] = str((folder / chosen["name"]).resolve())
+            chosen["name"] = str(whole_path(folder / chosen["name"]))
 
 
 def _find_map(scenario: Path, name: str) -> str:

@@ -24,14 +24,21 @@ def _only_numbers(value: Any) -> Any:
     """Refuse what Python would take for a number: true is no 1, and text is text."""
     if isinstance(value, bool | str | bytes):
         raise ValueError(f"must be a number, not {value!r}" if not isinstance(value, bool) else "must be a number")
+    if isinstance(value, float) and not math.isfinite(value):
+        raise ValueError("must be a finite number")
     return value
 
 
 NUMBER: Final = BeforeValidator(_only_numbers)
-Real = Annotated[float, NUMBER]
-Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False), NUMBER]
 Fraction = Annotated[float, Field(ge=0.0, le=1.0), NUMBER]
-NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False), NUMBER]
+Size = Annotated[float, Field(ge=1e-3, le=100.0), NUMBER]
+"""Of a body."""
+Side = Annotated[float, Field(ge=1e-3, le=100.0), NUMBER]
+"""Of a cell."""
+Reach = Annotated[float, Field(ge=0.0, le=1000.0), NUMBER]
+"""Of a sensor, or of what is kept free."""
+Pace = Annotated[float, Field(ge=1e-3, le=1000.0), NUMBER]
+"""Speeds, turn rates."""
 Angle = Annotated[float, Field(ge=0.0, le=45.0), NUMBER]
 Rate = Annotated[float, Field(ge=0.0, le=3600.0), NUMBER]
 Metres = Annotated[float, Field(ge=-LONGEST_M, le=LONGEST_M), NUMBER]
@@ -58,19 +65,19 @@ class _Strict(BaseModel):
 class RobotModel(_Strict):
     """The robots' data sheet; a list of them, one for each robot, when they differ."""
 
-    radius_m: Positive = BODY.radius_m
+    radius_m: Size = BODY.radius_m
     """Radius of the circle round the body [m]."""
-    half_width_m: Positive = BODY.half_width_m
+    half_width_m: Size = BODY.half_width_m
     """Half of the body's width across its direction of travel, r_0 [m]."""
     footprint: Annotated[list[tuple[Metres, Metres]], Field(min_length=3, max_length=1000)] | None = None
     """Instead of both: corners of the body round the place that it turns about, x forward, y left [m]."""
-    v_max_mps: Positive = BODY.v_max_mps
+    v_max_mps: Pace = BODY.v_max_mps
     """Highest speed [m/s]."""
-    a_max_mps2: Positive = BODY.a_max_mps2
+    a_max_mps2: Annotated[float, Field(ge=1e-3, le=1e6), NUMBER] = BODY.a_max_mps2
     """Largest acceleration, also when braking [m/s²]."""
-    w_max_radps: Positive = BODY.w_max_radps
+    w_max_radps: Pace = BODY.w_max_radps
     """Highest turn rate [rad/s]."""
-    sensor_delay_s: NotNegative = BODY.sensor_delay_s
+    sensor_delay_s: Annotated[float, Field(ge=0.0, le=60.0), NUMBER] = BODY.sensor_delay_s
     """From a return to the command that heeds it, t_d: it makes the safety margin r wider [s]."""
 
     @model_validator(mode="before")
@@ -117,13 +124,13 @@ class LidarModel(_Strict):
 
     beams: Annotated[int, Field(ge=8, le=4096), NUMBER] = LIDAR.beams
     """Beams of a scan."""
-    fov_deg: Annotated[float, Field(gt=0.0, le=360.0), NUMBER] = LIDAR.fov_deg
+    fov_deg: Annotated[float, Field(ge=1.0, le=360.0), NUMBER] = LIDAR.fov_deg
     """Field of view, in the middle of which is straight ahead [°]."""
-    range_m: Positive = LIDAR.range_m
+    range_m: Annotated[float, Field(ge=0.01, le=1000.0), NUMBER] = LIDAR.range_m
     """Longest range; beyond it there is no return [m]."""
-    range_min_m: NotNegative = LIDAR.range_min_m
+    range_min_m: Reach = LIDAR.range_min_m
     """Shortest range; a nearer return is invalid and counts as blocked [m]."""
-    rate_hz: Annotated[float, Field(gt=0.0, le=100.0), NUMBER] = 1.0 / Setting.dt
+    rate_hz: Annotated[float, Field(ge=0.01, le=100.0), NUMBER] = 1.0 / Setting.dt
     """Scans per second; a robot decides once for each scan [Hz]."""
 
 
@@ -181,13 +188,13 @@ class FaultsModel(_Strict):
 class RadioModel(_Strict):
     """The link between robots."""
 
-    range_m: NotNegative = RADIO.range_m
+    range_m: Annotated[float, Field(ge=0.0, le=1e6), NUMBER] = RADIO.range_m
     """Packets to robots farther away are sent in vain [m]."""
-    latency_s: NotNegative = RADIO.latency_s
+    latency_s: Duration = RADIO.latency_s
     """From the end of the sending to the delivery [s]."""
     loss: Fraction = RADIO.loss
     """Share of packets that are lost by chance."""
-    bitrate_bps: Positive = RADIO.bitrate_bps
+    bitrate_bps: Annotated[float, Field(ge=1.0, le=1e12), NUMBER] = RADIO.bitrate_bps
     """Bandwidth of a robot's radio: a packet occupies sender and receiver for its bits over this [bit/s]."""
     exact_features: bool = SHARING.exact_features
     """Send features as float32 instead of bytes (to measure what quantisation costs)."""
@@ -196,32 +203,32 @@ class RadioModel(_Strict):
 class GuardModel(_Strict):
     """Distances kept free around the body."""
 
-    clearance_m: NotNegative = GUARDING.clearance_m
+    clearance_m: Reach = GUARDING.clearance_m
     """Kept free around the body by the guard, which slows down or stops [m]."""
-    footprint_clearance_m: NotNegative = GUARDING.footprint_clearance_m
+    footprint_clearance_m: Reach = GUARDING.footprint_clearance_m
     """Added to the radius where ways are planned: directions that the widened body can take are safe [m]."""
-    persistence_s: NotNegative = GUARDING.persistence_s
+    persistence_s: Duration = GUARDING.persistence_s
     """How long a neighbour that is out of sight is remembered [s]."""
-    lost_s: NotNegative = GUARDING.lost_s
+    lost_s: Duration = GUARDING.lost_s
     """How long a return is kept that is lost while no beam has passed its place, three scans at least; 0: not at all
     [s]."""
-    blind_s: NotNegative = GUARDING.blind_s
+    blind_s: Duration = GUARDING.blind_s
     """A robot brakes when its LiDAR has said nothing for so long, where something was [s]."""
-    thinnest_m: NotNegative = GUARDING.thinnest_m
+    thinnest_m: Reach = GUARDING.thinnest_m
     """Width of the narrowest thing that must not be missed between two beams: robots drive no faster than they can stop
     short of it; 0 asks for nothing [m]."""
-    others_mps: Annotated[float, Field(ge=-1.0, allow_inf_nan=False), NUMBER] = GUARDING.others_mps
+    others_mps: Annotated[float, Field(ge=-1.0, le=1000.0), NUMBER] = GUARDING.others_mps
     """How fast others may be; below 0: as fast as these robots, 0: nothing else moves [m/s]."""
     others_yield: bool = GUARDING.others_yield
     """Whether others run the same guard; before those that do not, a robot stands before they can reach it."""
-    others_smallest_m: Annotated[float, Field(ge=-1.0, allow_inf_nan=False), NUMBER] = GUARDING.others_smallest_m
+    others_smallest_m: Annotated[float, Field(ge=-1.0, le=1000.0), NUMBER] = GUARDING.others_smallest_m
     """Radius of the smallest other robot; below 0: of the smallest there is [m]."""
-    others_largest_m: Annotated[float, Field(ge=-1.0, allow_inf_nan=False), NUMBER] = GUARDING.others_largest_m
+    others_largest_m: Annotated[float, Field(ge=-1.0, le=1000.0), NUMBER] = GUARDING.others_largest_m
     """Radius of the largest other robot; below 0: of the largest there is [m]."""
-    strangers_mps: Annotated[float, Field(ge=-1.0, allow_inf_nan=False), NUMBER] = GUARDING.strangers_mps
+    strangers_mps: Annotated[float, Field(ge=-1.0, le=1000.0), NUMBER] = GUARDING.strangers_mps
     """How fast those are that are no robots and do not yield, people: a robot stands before they can reach it; below 0:
     as fast as the fastest disc that moves in this world, 0: there are none [m/s]."""
-    strangers_m: Annotated[float, Field(ge=-1.0, allow_inf_nan=False), NUMBER] = GUARDING.strangers_m
+    strangers_m: Annotated[float, Field(ge=-1.0, le=1000.0), NUMBER] = GUARDING.strangers_m
     """Radius of the smallest of them; below 0: of the smallest disc that moves in this world, 0.2 m without one [m]."""
 
 
@@ -230,15 +237,15 @@ class SafetyModel(_Strict):
 
     sector: bool = SAFETY.sector
     """Demand a free sector as wide as the scope angle within the planning distance l_th, as printed (3)."""
-    look_ahead_m: NotNegative = SAFETY.look_ahead_m
+    look_ahead_m: Reach = SAFETY.look_ahead_m
     """How far ahead a direction must be free; 0 leaves it at l_th [m]."""
-    margin_m: NotNegative = SAFETY.margin_m
+    margin_m: Reach = SAFETY.margin_m
     """Kept on both sides of the body within ``look_ahead_m`` [m]."""
-    narrow_m: NotNegative = SAFETY.narrow_m
+    narrow_m: Reach = SAFETY.narrow_m
     """How far ahead a gap must be free that the body just fits, when no direction is safe; 0 is r [m]."""
-    slow_mps: NotNegative = SAFETY.slow_mps
+    slow_mps: Reach = SAFETY.slow_mps
     """At lower speeds margins (18), (2) are those of this speed [m/s]."""
-    speed_step_mps: NotNegative = SAFETY.speed_step_mps
+    speed_step_mps: Reach = SAFETY.speed_step_mps
     """Above it they follow the present speed in steps of this; 0: those of the top speed, as printed [m/s]."""
 
 
@@ -260,9 +267,9 @@ class MapModel(_Strict):
     file: str
     """The map (looked for beside the scenario, too): map_server's YAML, a picture alone, a Moving AI .map, a .npz of
     ORION's mazes, a .world of Gazebo with cylinders and boxes (DynaBARN's move), or the name of a packaged map."""
-    resolution_m: Positive | None = None
+    resolution_m: Side | None = None
     """Side of a cell, for files that do not say it: all but map_server's YAML [m]."""
-    number: Annotated[int, Field(ge=0), NUMBER] | None = None
+    number: Annotated[int, Field(ge=0, lt=2**31), NUMBER] | None = None
     """Which of ORION's mazes; its starts and goals are the robots' unless others are given."""
     starts: list[MapPlace] = []
     """Where robots start, in the map's coordinates: x, y or x, y, yaw [m, m, rad]; without yaw they look at their goal.
@@ -273,9 +280,9 @@ class MapModel(_Strict):
     """What stands or moves there besides; each names its ``type``, none is a grid."""
     trips: str | None = None
     """A Moving AI .scen file (looked for beside the scenario, too): starts and goals of its trips."""
-    first_trip: Annotated[int, Field(ge=0), NUMBER] = 0
+    first_trip: Annotated[int, Field(ge=0, lt=2**31), NUMBER] = 0
     """Number of robot 0's trip, 0 is the first; the others have the next ones."""
-    min_distance_m: NotNegative | None = None
+    min_distance_m: Annotated[float, Field(ge=0.0, le=LONGEST_M), NUMBER] | None = None
     """From a start to its goal, where one of them is drawn, at least; null is 8 m, in maps whose free space is shorter
     than 20 m two fifths of that [m]."""
 
@@ -285,9 +292,9 @@ class WorldModel(_Strict):
 
     world: WorldSpec
     """Bounds and obstacles."""
-    starts: list[tuple[Real, Real, Real]]
+    starts: list[tuple[Metres, Metres, Heading]]
     """Where each robot starts: x, y, yaw [m, m, rad]."""
-    goals: list[tuple[Real, Real] | tuple[Real, Real, Heading]]
+    goals: list[tuple[Metres, Metres] | tuple[Metres, Metres, Heading]]
     """Where each robot wants to go, with a yaw to which it turns there or without: x, y or x, y, yaw [m, m, rad]."""
 
 
@@ -331,7 +338,7 @@ class Scenario(_Strict):
     """Distances kept free around the body."""
     safety: SafetyModel = SafetyModel()
     """Which directions are safe."""
-    limit_s: Positive = Setting.limit_s
+    limit_s: Annotated[float, Field(ge=1e-3, le=1e6), NUMBER] = Setting.limit_s
     """Simulated time after which the run ends; it ends earlier when all have arrived or collided [s]."""
     substeps: Annotated[int, Field(ge=1, le=1000), NUMBER] = Setting.substeps
     """Steps of motion and contact between two scans; more are taken where these leave the arc driven by 0.1 mm."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,7 +22,7 @@ from swarmscope.sim.state import Faults, Noise, Radio
 from swarmscope.sim.world import compile_world
 from swarmscope.tasks import Setup, load_task
 from swarmscope.tasks._contract import all_options
-from swarmscope.user_files import is_file_name
+from swarmscope.user_files import is_file_name, whole_path
 
 
 def complete(scenario: Scenario, run_files: bool = True) -> dict[str, Any]:
@@ -39,13 +38,13 @@ def complete(scenario: Scenario, run_files: bool = True) -> dict[str, Any]:
         values["task"]["options"] = all_options(load_task(task.name), task.options)
     for group in ("planner", "task"):
         if group in values and is_file_name(values[group]["name"]):
-            values[group]["name"] = str(Path(values[group]["name"]).resolve())
+            values[group]["name"] = str(whole_path(values[group]["name"]))
     if planner.model is not None:
-        values["planner"]["model"] = str(Path(planner.model).resolve())
+        values["planner"]["model"] = str(whole_path(planner.model))
     if scenario.map is not None and not is_packaged(scenario.map.file):
-        values["map"]["file"] = str(map_path(scenario.map.file).resolve())
+        values["map"]["file"] = str(whole_path(map_path(scenario.map.file)))
     if scenario.map is not None and scenario.map.trips is not None:
-        values["map"]["trips"] = str(Path(scenario.map.trips).resolve())
+        values["map"]["trips"] = str(whole_path(scenario.map.trips))
     return values
 
 

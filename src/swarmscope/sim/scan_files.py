@@ -19,6 +19,7 @@ clockwise (a negative increment), and scans may be shorter than others: readings
 from __future__ import annotations
 
 import math
+import warnings
 import zipfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -140,7 +141,7 @@ def _arrays_from_npz(path: Path) -> dict[str, npt.NDArray[Any]]:
         raise BadFile("is empty")
     try:
         _require_bounded_zip(path)
-        with np.load(path, allow_pickle=False) as archive:
+        with warnings.catch_warnings(action="ignore"), np.load(path, allow_pickle=False) as archive:
             return {key: np.asarray(archive[key]) for key in archive.files}
     except BadFile:
         raise

@@ -227,8 +227,7 @@ def _robotlaser(words: list[str], line: int) -> tuple[list[float], list[float], 
     start, _, step, longest = (number_in(word, line) for word in words[2:6])
     readings, _ = _counted(words, 8, 1, line)
     at = 9 + len(readings)
-    remissions = number_in(words[at], line)
-    rest = words[at + 1 + int(remissions) :] if 0.0 <= remissions < len(words) else []
+    rest = words[at + 1 + _count(words, at, line) :]
     if len(rest) < 12:
         raise BadFile(f"line {line}: torn: it ends after {len(words)} words")
     numbers = [number_in(word, line) for word in rest[:12]]
@@ -236,10 +235,17 @@ def _robotlaser(words: list[str], line: int) -> tuple[list[float], list[float], 
     return readings, [*numbers[3:6], numbers[11]], told
 
 
+def _count(words: list[str], at: int, line: int) -> int:
+    """Return the number of words that word ``at`` says follow it."""
+    count = number_in(words[at], line) if len(words) > at else 0.0
+    if not 0.0 <= count < len(words):
+        raise BadFile(f"line {line}: torn: it has {len(words)} words, of which {count:g} cannot be readings")
+    return int(count)
+
+
 def _counted(words: list[str], at: int, more: int, line: int) -> tuple[list[float], list[float]]:
     """Return as many readings as word ``at`` says, and ``more`` numbers after them."""
-    count = number_in(words[at], line) if len(words) > at else 0.0
-    stop = at + 1 + int(count) if 0.0 <= count < len(words) else len(words) + 1
+    stop = at + 1 + _count(words, at, line)
     if stop + more > len(words):
         raise BadFile(f"line {line}: torn: it ends after {len(words)} words")
     return (

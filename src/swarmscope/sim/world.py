@@ -18,6 +18,7 @@ from mapbox_earcut import triangulate_float64 as earcut
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 from swarmscope._jit import jit, jit_inline
+from swarmscope.errors import ConfigError
 
 PIECE_M = 1.0
 """Walls and polygon edges are cut into pieces no longer than this [m]: a look-up finds them by midpoint."""
@@ -36,6 +37,9 @@ FASTEST_MPS = 100.0
 LONGEST_S = 1.0e6
 MOST_POINTS = 100_000
 """Of the way of a disc, or times of a door."""
+MOST_PIECES = 1_000_000
+MOST_ENTRIES = 50_000_000
+"""Pairs of a polygon and a bin that it meets."""
 GAP_CAP = 255
 
 Floats = npt.NDArray[np.float64]
@@ -70,7 +74,7 @@ class Circle(_Model):
     """What it is."""
     center: Point
     """x, y [m]; of a disc that moves: in the beginning."""
-    radius: Length
+    radius: Annotated[Length, Field(ge=1e-6)]
     """Its radius [m]."""
     velocity: tuple[Speed, Speed] | None = None
     """It moves on like this for ever: vx, vy [m/s]."""
@@ -155,7 +159,7 @@ class Grid(_Model):
 
     type: Literal["grid"] = "grid"
     """What it is."""
-    resolution: Length
+    resolution: Annotated[_Finite, Field(ge=1e-3, le=100.0)]
     """Side of a cell [m]."""
     origin: Point
     """Lower left corner x, y [m]."""
@@ -200,6 +204,9 @@ class WorldSpec(_Model):
             raise ValueError(f"bounds {list(self.bounds)} are not [x0, y0, x1, y1] with x0 < x1 and y0 < y1")
         if sum(isinstance(obstacle, Grid) for obstacle in self.obstacles) > 1:
             raise ValueError("a world can hold one grid at most")
+        pieces = sum(map(_pieces, self.obstacles))
+        if pieces > MOST_PIECES:
+            raise ValueError(f"there are {pieces:.0f} m of walls and edges, at most {MOST_PIECES} are possible")
         return self
 
 
@@ -335,6 +342,13 @@ def bin_run(bins: Bins, start: Ints, row: int, x: float, y: float, reach: float)
     first = bin_index(x - chord, bins.x0, bins.size, bins.columns)
     last = bin_index(x + chord, bins.x0, bins.size, bins.columns)
     return start[row * bins.columns + first], start[row * bins.columns + last + 1]
+
+
+def _pieces(obstacle: Obstacle) -> float:
+    """Return into how many pieces the walls and edges of an obstacle are cut, about."""
+    if isinstance(obstacle, Circle | Grid):
+        return 0.0
+    return sum(1.0 + math.dist(a, b) / PIECE_M for a, b in pairwise(obstacle.points))
 
 
 def grid_from_solid(
@@ -491,11 +505,15 @@ def _polygon_entries(
     """Return which polygons' bounding boxes meet each bin, as (items, start)."""
     keys: list[Ints] = [np.zeros(0, dtype=np.int64)]
     items: list[Ints] = [np.zeros(0, dtype=np.int64)]
+    entries = 0
     for index, polygon in enumerate(polygons):
         first = np.floor((polygon.min(axis=0) - [x0, y0]) / size).astype(np.int64)
         last = np.floor((polygon.max(axis=0) - [x0, y0]) / size).astype(np.int64)
         column = np.arange(max(0, first[0]), min(columns - 1, last[0]) + 1)
         row = np.arange(max(0, first[1]), min(rows - 1, last[1]) + 1)
+        entries += len(column) * len(row)
+        if entries > MOST_ENTRIES:
+            raise ConfigError("obstacles", "too many polygons are too large: make them fewer or smaller")
         keys.append((np.minimum(row, rows - 1)[:, None] * columns + column).ravel())
         items.append(np.full(keys[-1].size, index, dtype=np.int64))
     order, start = _counting_sort(np.concatenate(keys), columns * rows)

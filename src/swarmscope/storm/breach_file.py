@@ -48,7 +48,7 @@ def read_case(file: Path) -> Case:
 def _forger(values: Any, where: str) -> Forger | None:
     if values is None:
         return None
-    if not isinstance(values, dict) or sorted(values) != sorted(FIELDS):
+    if not isinstance(values, dict) or set(values) != set(FIELDS):
         raise ConfigError(where, f"needs the keys {', '.join(FIELDS)} and no others")
     seed, per_tick, kinds = (values[name] for name in FIELDS)
     if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:

@@ -9,9 +9,11 @@ from typing import Any, NamedTuple
 
 from swarmscope.errors import InputFileError
 from swarmscope.judging.statistics import poisson_upper
+from swarmscope.texts import read_text
 
 FORMAT = 1
 HOUR = 3600.0
+MOST_BYTES = 1 << 30
 NUMBERS = ("number", "robots", "under_way_s", "driving_s", "arrived", "wall_s", "thrown")
 """What is kept of every run, beside its planner, place, reasons, refused draws and breach."""
 KEPT = (*NUMBERS, "planner", "where", "again", "reasons", "refused", "breach")
@@ -95,7 +97,7 @@ def read_tally(file: Path) -> Tally:
     try:
         if not file.exists():
             return found
-        values = json.loads(file.read_text(encoding="utf-8"))
+        values = json.loads(read_text(file, MOST_BYTES))
         if values["storms"] != FORMAT:
             raise InputFileError(file, f"is of format {values['storms']!r}, not {FORMAT}")
         for piece in values["pieces"]:
@@ -106,7 +108,7 @@ def read_tally(file: Path) -> Tally:
                 found.add(key, str(piece["revision"]), row)
     except OSError as error:
         raise InputFileError(file, error.strerror or "cannot be read") from None
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
         what = f"{type(error).__name__}: {error}"
         raise InputFileError(file, f"is torn, or not a storm's file; nothing was changed ({what[:120]})") from None
     return found

@@ -26,9 +26,9 @@ from swarmscope.user_files import is_file_name
 Option = float | str
 """What an option can be: a number, or one of a few words."""
 
-Amount = Annotated[float, Bounds(0.0)]
-Density = Annotated[float, Bounds(0.0, unit="1/m^2")]
-Length = Annotated[float, Bounds(0.0, unit="m")]
+Amount = Annotated[float, Bounds(0.0, 1000.0)]
+Density = Annotated[float, Bounds(0.0, 1000.0, "1/m^2")]
+Length = Annotated[float, Bounds(0.0, 1000.0, "m")]
 
 Options = TypeVar("Options")
 

@@ -40,6 +40,8 @@ LINE_OFFSET_M = 0.5  # from the square's side to the first rank of starts
 RING_OFFSET_M = 0.7  # from the disc's rim to the first ring of starts
 REDRAWS = 20  # how often an unsolvable forest is drawn anew
 TRIES_PER_TREE = 400
+MOST_TREES = 2_000_000
+SURE_LEFT, SURE_SHARE = 1000, 0.01  # of so many trees that are left, a smaller share placed by 4 tries a tree: never
 TREES, GOALS, ROCKS = 1, 2, 3  # purposes: each has its own random stream
 
 Floats = NDArray[np.float64]
@@ -180,6 +182,8 @@ def _radii(rng: np.random.Generator, places: Places, options: ForestOptions) -> 
     if 2.0 * options.radius_max >= places.extent:
         raise ConfigError("radius_max", f"is too large for a forest of {places.extent:.2f} m")
     count = round(options.density * places.area)
+    if count > MOST_TREES:
+        raise ConfigError("density", f"{count} {options.obstacles} are more than {MOST_TREES}: lower it, or size_m")
     return rng.uniform(options.radius_min, options.radius_max, count)
 
 
@@ -202,7 +206,9 @@ def _planted(
             )
         unit = rng.random((4 * count, 2))
         tries += len(unit)
-        planted = placer.place(trees, planted, placer.spread(unit))
+        left, planted = count - planted, placer.place(trees, planted, placer.spread(unit))
+        if left > SURE_LEFT and count - planted > (1.0 - SURE_SHARE) * left:
+            tries = TRIES_PER_TREE * count
     return trees
 
 

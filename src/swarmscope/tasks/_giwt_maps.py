@@ -26,6 +26,12 @@ SIDE_M = (0.5, 3.0)
 RADIUS_M = (0.5, 3.0)
 REDRAWS = 200
 """Of one obstacle; after so many it is left out."""
+MOST_TRIES, TRIES_EACH = 10_000, 5
+"""When more places, and more for each obstacle, are drawn for a map, it is full."""
+DRAWS, FEWEST_DRAWS, MOST_DRAWN = 50, 5, 5000
+"""So many maps are drawn, fewer where they have many obstacles."""
+LEFT_OUT = 20
+"""When so many more are left out than placed there is no point in going on."""
 
 Floats = NDArray[np.float64]
 Range = tuple[float, float]
@@ -66,15 +72,20 @@ def draw_obstacles(
 ) -> list[Obstacle]:
     """Return obstacles, from the first to the second of ``counts``, ``free_m`` [m] off the points ``keep_free (K, 2)``.
 
-    One for which REDRAWS places are not enough is left out.
+    One for which REDRAWS places are not enough is left out. Errors: ConfigError if most of many are.
     """
     obstacles: list[Obstacle] = []
-    for _ in range(int(rng.integers(int(counts[0]), int(counts[1]) + 1))):
+    wanted = int(rng.integers(int(counts[0]), int(counts[1]) + 1))
+    tries = 0
+    for number in range(wanted):
         for _ in range(REDRAWS):
+            tries += 1
             one = _draw_obstacle(rng, kind, sizes)
             if _stays_off(one, keep_free, free_m):
                 obstacles.append(one)
                 break
+        if number - len(obstacles) > LEFT_OUT + len(obstacles) or tries > max(MOST_TRIES, TRIES_EACH * wanted):
+            raise ConfigError("most", f"{wanted} obstacles do not fit: lower it, or 'robots', or enlarge the map")
     return obstacles
 
 
@@ -116,6 +127,11 @@ def _stays_off(obstacle: Obstacle, points: Floats, distance: float) -> bool:
     return bool(not inside.any() and np.hypot(off[:, :, 0], off[:, :, 1]).min() > distance)
 
 
+def draws_of(most: float) -> int:
+    """Return how many maps with up to ``most`` obstacles are drawn before a seed is given up."""
+    return max(FEWEST_DRAWS, min(DRAWS, MOST_DRAWN // max(1, int(most))))
+
+
 def check_counts(fewest: float, most: float, task: str) -> None:
     """Raise a ConfigError unless there is a whole number of obstacles from ``fewest`` to ``most``."""
     if int(most) < int(fewest):
@@ -124,4 +140,5 @@ def check_counts(fewest: float, most: float, task: str) -> None:
 
 def unsolvable(name: str, seed: int, draws: int, why: str) -> UnsolvableWorldError:
     """Return the error for a seed that gives no solvable map."""
-    return UnsolvableWorldError(f"{name}: no solvable map in {draws} draws of seed {seed} ({why})")
+    remedy = "lower 'most' or 'robots', or enlarge the map"
+    return UnsolvableWorldError(f"{name}: no solvable map in {draws} draws of seed {seed} ({why}); {remedy}")

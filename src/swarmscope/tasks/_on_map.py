@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from swarmscope.errors import ConfigError, UnsolvableWorldError
 from swarmscope.sim.contact import static_clearance
 from swarmscope.sim.world import WorldSpec, compile_world
-from swarmscope.tasks._check import CLEARANCE_M, LARGEST_GRID_CELLS, RESOLUTION_M, check_places, check_setup
+from swarmscope.tasks._check import CLEARANCE_M, RESOLUTION_M, check_places, check_setup
 from swarmscope.tasks._contract import Setup, check_robots
 from swarmscope.tasks._occupancy import Raster, cells_of, centres_of, components, largest_label, rasterise
 from swarmscope.tasks._search import Searcher
@@ -20,6 +20,8 @@ from swarmscope.tasks._search import Searcher
 STARTS, GOALS = 1, 2  # purposes: each has its own random stream
 TRIES_PER_ROBOT = 1000
 SEARCHES_PER_ROBOT = 50
+LARGEST_GRID_CELLS = 40_000_000  # of a grid that is searched; larger maps are searched on a coarser one
+SEARCHED_CELLS = 500_000_000  # fewer searches for a robot on large grids
 USUAL_M = 8.0
 """How far starts are from goals if nobody says so, ..."""
 SHARE = 0.4
@@ -162,12 +164,16 @@ def _largest_part(raster: Raster) -> Ints:
 
 def _place_for(robot: int, what: str, other: Floats, places: _Scatter, searcher: Searcher, least: float) -> Floats:
     """Return a start or goal at least so far [m] from the robot's other end."""
+    searches = max(2, SEARCHED_CELLS // searcher.raster.blocked.size)
     for _ in range(SEARCHES_PER_ROBOT):
         place = places.draw()
         if place is None:
             break
         if float(np.hypot(*(place - other))) >= least:
             return place
+        searches -= 1
+        if searches < 0:
+            break
         ends = cells_of(searcher.raster, np.stack([other, place]))
         if searcher.length_m(ends[0], ends[1]) >= least:
             return place

@@ -16,7 +16,7 @@ from swarmscope.sim.world import WorldSpec, compile_world
 from swarmscope.tasks._check import CLEARANCE_M, RESOLUTION_M, check_places
 from swarmscope.tasks._contract import Option, Setup, check_robots, read_options
 from swarmscope.tasks._forest import smallest_spacing, yaw_toward
-from swarmscope.tasks._giwt_maps import MapOptions, check_counts, draw_map, unsolvable
+from swarmscope.tasks._giwt_maps import MapOptions, check_counts, draw_map, draws_of, unsolvable
 from swarmscope.tasks._occupancy import centres_of, components, labels_at, rasterise
 
 NAME = "GIWT_1"
@@ -26,7 +26,6 @@ FREE_M = 0.25  # from a start or goal to an obstacle, beyond the robot's radius
 APART_M = 1.0  # between two robots; wider ones keep as far apart as in a line
 CROWD = 40
 """With more robots the map grows."""
-DRAWS = 50
 TRIES = 4000
 
 Floats = NDArray[np.float64]
@@ -47,7 +46,8 @@ def make(seed: int, robots: int = 15, radius: float = 0.15, **options: Option) -
     check_robots(robots, radius)
     chosen = grown(read_options(OPTIONS, options, NAME), robots)
     check_counts(chosen.fewest, chosen.most, NAME)
-    for draw in range(DRAWS):
+    draws = draws_of(chosen.most)
+    for draw in range(draws):
         rng = np.random.default_rng([seed, draw])
         world = draw_map(rng, chosen, np.zeros((0, 2)), 0.0)
         starts = scatter(rng, world, robots, radius, chosen)
@@ -60,7 +60,7 @@ def make(seed: int, robots: int = 15, radius: float = 0.15, **options: Option) -
         setup = Setup(world, np.column_stack([points, yaw]), goals)
         check_places(setup, radius)
         return setup
-    raise unsolvable(NAME, seed, DRAWS, f"{robots} robots do not fit")
+    raise unsolvable(NAME, seed, draws, f"{robots} robots do not fit")
 
 
 def grown(options: Options, robots: int) -> Options:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from swarmscope.tasks._check import Reach, check_places, unreachable
 from swarmscope.tasks._contract import Option, Setup, check_robots, read_options
-from swarmscope.tasks._giwt_maps import MapOptions, check_counts, draw_map, unsolvable
+from swarmscope.tasks._giwt_maps import MapOptions, check_counts, draw_map, draws_of, unsolvable
 
 NAME = "GIWT_2"
 SUMMARY = "GIWT's task II: a column of robots crosses a random map from left to right, all in the same order"
@@ -15,7 +15,6 @@ OPTIONS = MapOptions
 
 EDGE_M = 0.5  # from the walls to the starts and the goals
 FREE_M = 0.35  # from them to an obstacle, beyond the robot's radius
-DRAWS = 50
 
 Floats = NDArray[np.float64]
 
@@ -26,14 +25,15 @@ def make(seed: int, robots: int = 15, radius: float = 0.15, **options: Option) -
     chosen = read_options(OPTIONS, options, NAME)
     check_counts(chosen.fewest, chosen.most, NAME)
     starts, goals = columns(robots, radius, chosen.size_m)
-    for draw in range(DRAWS):
+    draws = draws_of(chosen.most)
+    for draw in range(draws):
         rng = np.random.default_rng([seed, draw])
         world = draw_map(rng, chosen, np.vstack([starts[:, :2], goals]), radius + FREE_M)
         setup = Setup(world, starts, goals)
         if unreachable(setup, Reach(radius)).size == 0:
             check_places(setup, radius)
             return setup
-    raise unsolvable(NAME, seed, DRAWS, "somebody cannot reach its goal")
+    raise unsolvable(NAME, seed, draws, "somebody cannot reach its goal")
 
 
 def columns(robots: int, radius: float, size: float) -> tuple[Floats, Floats]:

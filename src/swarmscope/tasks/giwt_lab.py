@@ -16,7 +16,7 @@ from swarmscope.sim.world import WorldSpec
 from swarmscope.tasks._check import Reach, check_places, unreachable
 from swarmscope.tasks._contract import Amount, Length, Option, Setup, check_robots, read_options
 from swarmscope.tasks._forest import smallest_spacing
-from swarmscope.tasks._giwt_maps import Kind, Sizes, check_counts, draw_obstacles, unsolvable
+from swarmscope.tasks._giwt_maps import Kind, Sizes, check_counts, draw_obstacles, draws_of, unsolvable
 from swarmscope.tasks._rooms import WALL_M, closed_room
 
 NAME = "GIWT_lab"
@@ -26,7 +26,6 @@ SIDE_M = (0.2, 1.2)
 RADIUS_M = (0.2, 0.8)
 EDGE_M = 0.5  # from the walls to the surface of robots that start or arrive
 FREE_M = 0.35  # from them to an obstacle, beyond the robot's radius
-DRAWS = 50
 
 
 @dataclass(frozen=True)
@@ -55,11 +54,12 @@ def make(seed: int, robots: int = 5, radius: float = 0.15, **options: Option) ->
     keep_free, walls = np.vstack([starts[:, :2], goals]), closed_room(0.0, 0.0, width, length)
     counts, sizes = (chosen.fewest, chosen.most), Sizes((width, length), SIDE_M, RADIUS_M)
     bounds = (-WALL_M, -WALL_M, width + WALL_M, length + WALL_M)
-    for draw in range(DRAWS):
+    draws = draws_of(chosen.most)
+    for draw in range(draws):
         rng = np.random.default_rng([seed, draw])
         things = draw_obstacles(rng, chosen.obstacles, counts, sizes, keep_free, radius + FREE_M)
         setup = Setup(WorldSpec(obstacles=[*walls, *things], bounds=bounds), starts, goals)
         if unreachable(setup, Reach(radius)).size == 0:
             check_places(setup, radius)
             return setup
-    raise unsolvable(NAME, seed, DRAWS, "somebody cannot reach its goal")
+    raise unsolvable(NAME, seed, draws, "somebody cannot reach its goal")

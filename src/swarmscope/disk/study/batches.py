@@ -13,10 +13,9 @@ from typing import Any, NamedTuple
 
 from swarmscope.disk import controllers
 from swarmscope.disk.runs import Controller, Film, Outcome, Problem, no_outcome, play
-from swarmscope.disk.user import UserController, function_of
+from swarmscope.disk.user import CALL_S, UserController, check_file
 from swarmscope.errors import ConfigError, SwarmscopeError
 from swarmscope.experiments.engines.local import start_worker
-from swarmscope.user_files import compiled
 
 Report = Callable[[int, float, float], None]
 """Called with the number of runs done, and for a user's controller the seconds of a call and those left (else 0)."""
@@ -30,6 +29,8 @@ class Choice:
 
     name: str
     changes: Mapping[str, Any] = field(default_factory=dict)
+    call_s: float = CALL_S
+    """How long a call of a user's file may take."""
 
     @property
     def file(self) -> Path | None:
@@ -47,7 +48,7 @@ class Choice:
         if self.file:
             if self.changes:
                 raise ConfigError(self.name, "has no parameters to set; edit the file")
-            function_of(self.file, compiled(self.file))
+            check_file(self.file)
         else:
             controllers.find(self.name, self.changes)
 
@@ -61,7 +62,7 @@ class Choice:
     def make(self, of: Problem) -> Controller:
         """Return the controller for some runs."""
         if self.file:
-            return UserController(self.file, of)
+            return UserController(self.file, of, self.call_s)
         kind = controllers.find(self.name, self.changes)
         return kind.create(of, kind.params)
 
@@ -74,7 +75,7 @@ class Result(NamedTuple):
     seconds: float
 
 
-def read_choice(text: str) -> Choice:
+def read_choice(text: str, call_s: float = CALL_S) -> Choice:
     """Return the choice written as 'report', 'report:obstacle_buffer=0.005,robot_buffer=0.03' or 'mine.py'."""
     name, _, rest = text.partition(":")
     changes = {}
@@ -83,7 +84,7 @@ def read_choice(text: str) -> Choice:
         if not equals:
             raise ConfigError(text, f"'{part}' is not KEY=VALUE")
         changes[key.strip()] = value.strip()
-    choice = Choice(name, changes)
+    choice = Choice(name, changes, call_s)
     choice.check()
     return choice
 
@@ -91,10 +92,12 @@ def read_choice(text: str) -> Choice:
 def play_batch(choice: Choice, of: Problem, film: Film | None = None) -> Result:
     """Play some runs here."""
     controller = choice.make(of)
-    outcome = play(of, controller, film)
-    if isinstance(controller, UserController):
-        return Result(outcome, controller.calls, controller.seconds)
-    return Result(outcome, 0, 0.0)
+    if not isinstance(controller, UserController):
+        return Result(play(of, controller, film), 0, 0.0)
+    try:
+        return Result(play(of, controller, film), controller.calls, controller.seconds)
+    finally:
+        controller.close()
 
 
 def play_all(

@@ -11,8 +11,23 @@ import numpy as np
 
 from swarmscope.disk.bounds import bound
 from swarmscope.disk.rules import Floats, Ints
-from swarmscope.disk.runs import ARRIVED, HIT_OBSTACLE, HIT_ROBOT, LEFT_DISK, STATUS_WORDS, Outcome, Problem
+from swarmscope.disk.runs import (
+    ARRIVED,
+    COLLISIONS,
+    HIT_OBSTACLE,
+    HIT_ROBOT,
+    INVALID,
+    LEFT_DISK,
+    STATUS_WORDS,
+    Outcome,
+    Problem,
+)
+from swarmscope.errors import SwarmscopeError
 from swarmscope.judging.statistics import Interval, PairedDifference, bootstrap_mean, paired_difference, wilson
+
+
+class ImpossibleResultError(SwarmscopeError):
+    """A result that is better than the bound which nothing can beat."""
 
 
 class Published(NamedTuple):
@@ -90,8 +105,23 @@ class Row(NamedTuple):
 
 
 def played(label: str, problem: Problem, outcome: Outcome, least: Ints | None = None) -> Played:
-    """Return runs with their bounds (computed if not given)."""
-    return Played(label, problem, outcome, bound(problem) if least is None else least)
+    """Return runs with their bounds (computed if not given). Errors: ImpossibleResultError."""
+    found = Played(label, problem, outcome, bound(problem) if least is None else least)
+    below = np.flatnonzero((outcome.status == ARRIVED) & (outcome.steps < found.bound))
+    if below.size:
+        b = int(below[0])
+        name = problem.maps[problem.map_of[b]].name
+        raise ImpossibleResultError(
+            f"{label}: impossible: on map {name}, permutation {_permutation(problem, b)}, all arrived after "
+            f"{outcome.steps[b]} steps, and nobody can need fewer than {found.bound[b]}: the judge was tampered with, "
+            "or is wrong; please report it"
+        )
+    return found
+
+
+def collided(of: Played) -> bool:
+    """Tell whether some run ended by contact, or without a valid velocity."""
+    return bool(np.isin(of.outcome.status, (*COLLISIONS, INVALID)).any())
 
 
 def row(of: Played, place: str, runs: Sequence[int] | Ints | None = None) -> Row:

@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 import yaml
 
+from swarmscope.bounds import number_of
 from swarmscope.errors import ConfigError, InputFileError
 from swarmscope.sim.maps.files import as_grid
 from swarmscope.sim.maps.picture import MODES, Reading, free_cells
 from swarmscope.sim.world import Grid, grid_from_solid, solid_from_grid
-from swarmscope.texts import read_yaml
+from swarmscope.texts import check_regular, read_yaml
 
 YAML = (".yaml", ".yml")
 """Ends of the names of map descriptions; any other file is a picture."""
@@ -104,10 +105,7 @@ def _need(path: Path, settings: dict[str, Any], key: str) -> Any:
 
 def _as_number(path: Path, key: str, value: Any) -> float:
     """Return a finite number; text such as 1e-1, which YAML 1.1 does not take for a number, is accepted."""
-    try:
-        number = math.nan if isinstance(value, bool) else float(value)
-    except (TypeError, ValueError, OverflowError):
-        number = math.nan
+    number = number_of(value)
     if not math.isfinite(number):
         raise ConfigError(f"{path}: {key}", f"must be a finite number, got {value!r}")
     return number
@@ -144,6 +142,11 @@ def _image_path(path: Path, settings: dict[str, Any]) -> Path:
     if not isinstance(name, str):
         raise ConfigError(f"{path}: image", f"must be a file name, got {name!r}")
     try:
-        return path.parent / Path(name).expanduser()
+        image = path.parent / Path(name).expanduser()
     except RuntimeError as error:
         raise ConfigError(f"{path}: image", f"{name!r}: {error}") from None
+    try:
+        check_regular(image, None)
+    except InputFileError as error:
+        raise InputFileError(image, f"{error.why}; it is the image of {path}") from None
+    return image
