@@ -104,7 +104,8 @@ def run(
         typer.Option(metavar="X,Y[,DEG]", help="Start of the next robot on the map, metres and degrees; repeatable."),
     ] = None,
     goal: Annotated[
-        list[str] | None, typer.Option(metavar="X,Y", help="Goal of the next robot on the map, metres; repeatable.")
+        list[str] | None,
+        typer.Option(metavar="X,Y[,DEG]", help="Goal of the next robot on the map, metres, degrees; repeatable."),
     ] = None,
     trips: Annotated[str | None, typer.Option(help="Moving AI .scen file: starts and goals on the map.")] = None,
     first_trip: Annotated[int | None, typer.Option(min=0, help="Trip of robot 0, else the file's first, 0.")] = None,

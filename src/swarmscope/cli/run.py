@@ -32,8 +32,8 @@ from swarmscope.viewing.progress import progress_bar
 MOST_FAILURES = 10
 OPTIONS = {"starts": "start", "goals": "goal", "resolution_m": "resolution", "first_trip": "first-trip"}
 """Options that are not called as their keys."""
-PLACED = {"starts": 3, "goals": 2}
-"""Options that are places, and how many numbers each has at most."""
+PLACED = ("starts", "goals")
+"""Options that are places."""
 ROWS = (
     ("arrival_rate", "arrived", "{:.1%}"),
     ("collisions", "collisions", "{:.0f}"),
@@ -118,15 +118,15 @@ def _set_option(values: dict[str, Any], key: str, value: Any) -> None:
     if dot and not isinstance(values.get(group), dict):
         raise ConfigError(option, "needs --map, or a scenario with a map")
     if name in PLACED:
-        value = [_read_place(text, option, PLACED[name]) for text in value]
+        value = [_read_place(text, option) for text in value]
     set_path(values, key.split("."), value, option)
 
 
-def _read_place(text: str, option: str, most: int) -> list[float]:
+def _read_place(text: str, option: str) -> list[float]:
     """Return x, y [m] and what may follow, degrees in radians."""
     numbers = [number_of(part) for part in text.split(",")]
-    if not 2 <= len(numbers) <= most or not np.isfinite(numbers).all():
-        raise ConfigError(f"{option} {text}", "must look like X,Y" + (" or X,Y,DEG" if most > 2 else ""))
+    if len(numbers) not in (2, 3) or not np.isfinite(numbers).all():
+        raise ConfigError(f"{option} {text}", "must look like X,Y or X,Y,DEG")
     return [*numbers[:2], *np.radians(numbers[2:]).tolist()]
 
 

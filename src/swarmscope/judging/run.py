@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from swarmscope.judging.cases import choices_table, opinions_table
+from swarmscope.judging.in_the_way import MOST_ASKED, who_is_in_the_way
 from swarmscope.judging.metrics import (
     all_metrics,
     mover_arrival_rate,
@@ -217,12 +218,16 @@ def place_name(scenario: Scenario) -> str:
 def failures(outcome: Outcome) -> list[dict[str, Any]]:
     """Name each robot that did not arrive, and why."""
     robots, records, reasons = outcome.trace.robots, outcome.trace.records, outcome.setting.planner.reasons
-    found = []
+    found: list[dict[str, Any]] = []
+    places = np.column_stack([robots["x"], robots["y"]])
     for i in np.flatnonzero(~np.isfinite(robots["arrival_s"])):
         state, reason = STATE_NAMES[records.state[-1, i]], reasons[records.reason[-1, i]]
         to_go = float(np.hypot(robots["goal_x"][i] - robots["x"][i], robots["goal_y"][i] - robots["y"][i]))
         late = f"time limit in state '{state}': {reason}; {to_go:.1f} m from its goal"
         why = "collided" if robots["crashed"][i] else late
+        if len(found) < MOST_ASKED and not robots["crashed"][i]:
+            ways = who_is_in_the_way(outcome.setup, places, robots["radius"], int(i))
+            why += f"; robot {ways[0]} stands in its only way" if ways else ""
         found.append({"robot": int(i), "why": why})
     return found
 

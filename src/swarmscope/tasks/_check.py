@@ -199,6 +199,14 @@ def pass_each_other(setup: Setup, reach: Reach) -> bool:
     return True
 
 
+def reachable_past(setup: Setup, reach: Reach, others: Floats) -> bool:
+    """Tell whether the one robot of a setup has a way past discs that stand: ``others`` (K, 3) x, y, radius [m]."""
+    raster = _raster_of(setup, reach)
+    if len(others):
+        raster = with_circles(raster, others, reach.radius + reach.clearance)
+    return not _apart(raster, setup.starts, setup.goals, reach).size
+
+
 def _raster_of(setup: Setup, reach: Reach) -> Raster:
     domain = domain_of(setup.world, [setup.starts, setup.goals])
     area = (domain[2] - domain[0]) * (domain[3] - domain[1])
