@@ -476,10 +476,8 @@ def short_runs() -> Iterator[None]:
     from swarmscope.judging import run as judging
     from swarmscope.sim import loop
 
-    def first_ticks(setting: Any, progress: Any = None, between: Any = None) -> Any:
-        return loop.run(
-            dataclasses.replace(setting, limit_s=min(setting.limit_s, TICKS * setting.dt)), progress, between
-        )
+    def first_ticks(setting: Any, *hooks: Any) -> Any:
+        return loop.run(dataclasses.replace(setting, limit_s=min(setting.limit_s, TICKS * setting.dt)), *hooks)
 
     def enough(*_: Any) -> Any:
         raise _EnoughError

@@ -30,6 +30,7 @@ from swarmscope.viewing.frames import as_frame, check_frame, robot_columns, tick
 from swarmscope.viewing.pictures import write_picture
 from swarmscope.viewing.progress import QUIET_S, progress_bar
 from swarmscope.viewing.replay import write_replay
+from swarmscope.viewing.run_data import ONLY_WHERE_THINGS_MOVE
 from swarmscope.viewing.run_data import load_run as read_run
 from swarmscope.viewing.trace import Trace
 
@@ -148,7 +149,8 @@ def simulate(
 def load_run(folder: Path | str) -> Run:
     """Return the run in a run folder, as ``simulate`` returned it; errors: InputFileError."""
     data = read_run(Path(folder))
-    arrays = data.trajectory._asdict()
+    recorded = data.trajectory._asdict().items()
+    arrays = {name: array for name, array in recorded if name not in ONLY_WHERE_THINGS_MOVE or array.size}
     files = read_user_files(data.folder)
     return Run(Contents(read_config(data.folder), read_world(data.folder), arrays, data.metrics, files))
 

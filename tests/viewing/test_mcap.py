@@ -57,16 +57,20 @@ def messages_of(path: Path) -> dict[str, list]:
 def made(request, tmp_path_factory) -> Made:
     scenario = scenario_of(lidar={"fov_deg": request.param, "beams": 90})
     folder, exact, given = tmp_path_factory.mktemp("mcap") / "run", Exact(), []
-    step = loop._step
+    stepper = loop._stepper
 
-    def spied(setting, held, memory, first, last):
-        if last > first:
-            sensor = setting.rig.sensor
-            given.append(held.what.scans[:, sensor.first : sensor.first + 90].copy())
-        step(setting, held, memory, first, last)
+    def spied(setting, swarm, memory):
+        step, sensor = stepper(setting, swarm, memory), setting.rig.sensor
+
+        def step_all(first, last):
+            if last > first:
+                given.append(swarm.scans[:, sensor.first : sensor.first + 90].copy())
+            step(first, last)
+
+        return step_all
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(loop, "_step", spied)
+        patch.setattr(loop, "_stepper", spied)
         run_scenario(scenario, folder, extras=make.adder(exact), watch=exact.watch)
     return Made(load_run(folder), given, messages_of(folder / "run.mcap"))
 

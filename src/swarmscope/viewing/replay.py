@@ -13,6 +13,7 @@ import numpy as np
 
 from swarmscope.sim.world import WALL_M
 from swarmscope.viewing.run_data import (
+    ONLY_WHERE_THINGS_MOVE,
     Array,
     RunData,
     crash_ticks,
@@ -92,7 +93,11 @@ def page_data(run: RunData) -> dict[str, Any]:
         "range_max_m": float(trajectory.range_max_m),
         "scan_stride": stride,
         "crash_ticks": crash_ticks(trajectory).tolist(),
-        "arrays": {name: _encode(arrays[name], kind) for name, kind in _TYPES.items()},
+        "arrays": {
+            name: _encode(arrays[name], kind)
+            for name, kind in _TYPES.items()
+            if name not in ONLY_WHERE_THINGS_MOVE or arrays[name].size
+        },
     }
 
 

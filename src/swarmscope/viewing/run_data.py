@@ -127,6 +127,9 @@ class RunData:
     metrics: dict[str, Any]
 
 
+ONLY_WHERE_THINGS_MOVE = ("disc_xy_m", "door_closed")
+"""Arrays that a run has in whose world something moves by itself."""
+
 _KINDS = {
     "state_names": "U",
     "reason_names": "U",
