@@ -192,8 +192,8 @@ print(stats.cache_path)
 """
 
 
-def test_a_second_process_finds_a_planners_loop_on_disk_and_not_that_of_an_edited_planner(tmp_path):
-    """The seconds that compiling takes are waited for once; what is found is never that of an older text."""
+def test_a_second_process_finds_a_planners_loop_on_disk(tmp_path):
+    """The seconds that compiling takes are waited for once; that edited text is compiled: ``test_kernel_cache``."""
 
     def said():
         numbers, kept = python(COUNT, folders=[str(tmp_path)], NUMBA_DISABLE_JIT="0").splitlines()
@@ -202,8 +202,6 @@ def test_a_second_process_finds_a_planners_loop_on_disk_and_not_that_of_an_edite
     place = tmp_path / "kept_on_disk.py"
     place.write_text(BOLD, encoding="utf-8")
     assert said()[0] == [0, 1, 0.5]  # cache hits, misses, speed
-    assert said()[0] == [1, 0, 0.5]
-    place.write_text(BOLD.replace("params.speed,", "0.5 * params.speed,"), encoding="utf-8")
     numbers, kept = said()
-    assert numbers == [0, 1, 0.25]
+    assert numbers == [1, 0, 0.5]
     forget(kept, tmp_path)
