@@ -12,6 +12,8 @@ from swarmscope.onboard.percept import PEERS, Row
 from swarmscope.onboard.rig import SIGMAS, Rig
 from swarmscope.onboard.view import GUARD_ALONE, View
 
+SMOOTH = 0.03
+"""Ranges of neighbouring beams on one surface differ by no more than this share."""
 BESIDE_M = 0.06
 """Returns so far outside a neighbour's body may belong to it."""
 SKIN_M = 0.01
@@ -160,11 +162,11 @@ def measure_bodies(see: View) -> None:
     """Learn how large neighbours are where robots differ: no return lies inside a body.
 
     Each counts as large as the largest, until returns have shown less. Only what is seen in this tick tells, and no
-    more exactly than positions are known.
+    more exactly than ranges and positions are known; scans that were moved on show places that nobody has measured.
     """
     shared, rig = see.shared, see.rig
     smallest, largest = rig.guarding.others_smallest_m, rig.guarding.others_largest_m
-    if not smallest < largest:
+    if not smallest < largest or rig.guarding.latency_s > 0.0:
         return
     c, s = math.cos(see.percept["compass"]), math.sin(see.percept["compass"])
     for t in range(PEERS):
@@ -172,20 +174,21 @@ def measure_bodies(see: View) -> None:
             continue
         x = c * shared["track_x"][t] + s * shared["track_y"][t]
         y = c * shared["track_y"][t] - s * shared["track_x"][t]
-        errs = neighbour_reach(0.0, math.sqrt(x * x + y * y), rig) - BESIDE_M + SKIN_M
-        errs += rig.guarding.others_mps * rig.guarding.latency_s
-        shows = _nearest_to(see, x, y) + errs
+        sigma = rig.sensor.position_sigma + rig.sensor.range_sigma
+        shows = _nearest_to(see, x, y) + SKIN_M + 2.0 * SIGMAS * sigma * math.sqrt(x * x + y * y)
         shared["track_radius"][t] = max(smallest, min(shared["track_radius"][t], shows))
 
 
 @jit_inner
 def _nearest_to(see: View, x: float, y: float) -> float:
-    """Return how near a return of now comes to the point (x, y), body frame [m]."""
+    """Return how near a return of now, on a surface, comes to the point (x, y), body frame [m]."""
     rig, best = see.rig, math.inf
-    for n in range(rig.sensor.beams):
+    for n in range(1, rig.sensor.beams - 1):
         s = see.scan[n]
-        out_of_view = rig.sensor.field > 0 and not see.shared["view_first"] <= n <= see.shared["view_last"]
+        out_of_view = rig.sensor.field > 0 and not see.shared["view_first"] < n < see.shared["view_last"]
         if see.unseen[n] != 0 or out_of_view or not s < rig.sensor.range_max:
+            continue
+        if abs(see.scan[n - 1] - s) > SMOOTH * s or abs(see.scan[n + 1] - s) > SMOOTH * s:
             continue
         ex, ey = s * rig.cos[n] - x, s * rig.sin[n] - y
         best = min(best, ex * ex + ey * ey)
