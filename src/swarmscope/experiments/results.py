@@ -156,6 +156,12 @@ class TimeBudget(NamedTuple):
     duration_s: float
 
 
+def _top_speeds(robot: Any, robots: int) -> np.ndarray:
+    """Return the top speed of each robot [m/s]: all are alike, or each has a data sheet."""
+    sheets = robot if isinstance(robot, list) else [robot] * robots
+    return np.array([sheet["v_max_mps"] for sheet in sheets], float)
+
+
 def time_budget(runs: list[Run]) -> TimeBudget:
     """Return where the time goes, means over the maps in which somebody arrived; NaN without any."""
     rows = []
@@ -164,8 +170,8 @@ def time_budget(runs: list[Run]) -> TimeBudget:
         duration, waiting = run.figures.get("duration_s"), run.figures.get("waiting_s")
         if not there.any() or duration is None or waiting is None:
             continue
-        v_max = float(run.config["robot"]["v_max_mps"])
-        shortest, travelled = run.shortest_m[there].mean() / v_max, run.travelled_m[there].mean() / v_max
+        v_max = _top_speeds(run.config["robot"], len(there))[there]
+        shortest, travelled = (run.shortest_m[there] / v_max).mean(), (run.travelled_m[there] / v_max).mean()
         mean = run.arrival_s[there].mean()
         parts = (shortest, travelled - shortest, waiting, mean - travelled - waiting, duration - mean, duration)
         rows.append(parts)

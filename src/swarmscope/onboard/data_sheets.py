@@ -95,6 +95,8 @@ def rig_of(body: Body, lidar: Lidar, scans: Scans, options: Mapping[str, Any]) -
         raise ConfigError("lidar.range_m", f"{lidar.range_m:g} m is less than this body needs to stop, {reach:.2f} m")
     guarding, safety, sharing = (_part(kind, options) for kind in (Guarding, Safety, Sharing))
     guarding = guarding._replace(latency_s=guarding.latency_s + sweep_s(lidar))  # the oldest reading counts
+    if guarding.strangers_mps > 0.0 and lidar.masks_deg:
+        raise ConfigError("lidar.masks_deg", "somebody may come where this LiDAR is masked: strangers_mps 0 would do")
     return make_rig(body, all_round(sensor_of(lidar, scans.grid)), guarding, safety, sharing)
 
 

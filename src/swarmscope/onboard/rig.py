@@ -48,13 +48,13 @@ class Guarding(NamedTuple):
     others_yield: bool = True
     """Whether others run the same guard."""
     others_smallest_m: float = -1.0
-    """Radius of the smallest of them; below 0, or above this robot's own: that."""
+    """Radius of the smallest of them; 0 and below, or above this robot's own: that."""
     others_largest_m: float = -1.0
-    """Radius of the largest; below 0: this robot's."""
+    """Radius of the largest; 0 and below: this robot's."""
     strangers_mps: float = -1.0
     """How fast those are that are no robots and do not yield, people; 0 and below: there are none."""
     strangers_m: float = -1.0
-    """Radius of the smallest of them; below 0: `STRANGERS_M`."""
+    """Radius of the smallest of them; 0 and below: `STRANGERS_M`."""
 
 
 class Safety(NamedTuple):
@@ -205,7 +205,8 @@ def _resolved(guarding: Guarding, body: Body) -> Guarding:
     own = {"others_mps": body.v_max_mps, "others_smallest_m": body.radius_m, "others_largest_m": body.radius_m}
     own |= {"strangers_mps": 0.0, "strangers_m": STRANGERS_M}
     given = {name: float(value) for name, value in guarding._asdict().items() if name != "others_yield"}
-    filled = given | {name: value for name, value in own.items() if not given[name] >= 0.0}
+    unsaid = [name for name in own if not (given[name] > 0.0 or (given[name] == 0.0 and name.endswith("_mps")))]
+    filled = given | {name: own[name] for name in unsaid}
     filled["others_smallest_m"] = min(filled["others_smallest_m"], body.radius_m)
     filled["others_largest_m"] = max(filled["others_largest_m"], filled["others_smallest_m"])
     return Guarding(**filled, others_yield=bool(guarding.others_yield))

@@ -47,7 +47,8 @@ def set_path(values: dict[str, Any], path: Sequence[str], value: Any, where: str
     for part in parents:
         at = at.setdefault(part, {})
         if not isinstance(at, dict):
-            raise ConfigError(where, f"'{part}' is not a group of keys")
+            many = " but a list: change it in the file" if isinstance(at, list) else ""
+            raise ConfigError(where, f"'{part}' is not a group of keys{many}")
     at[last] = value
 
 

@@ -222,14 +222,14 @@ class GuardModel(_Strict):
     others_yield: bool = GUARDING.others_yield
     """Whether others run the same guard; before those that do not, a robot stands before they can reach it."""
     others_smallest_m: Annotated[float, Field(ge=-1.0, le=1000.0), NUMBER] = GUARDING.others_smallest_m
-    """Radius of the smallest other robot; below 0: of the smallest there is [m]."""
+    """Radius of the smallest other robot; 0 and below: of the smallest there is [m]."""
     others_largest_m: Annotated[float, Field(ge=-1.0, le=1000.0), NUMBER] = GUARDING.others_largest_m
-    """Radius of the largest other robot; below 0: of the largest there is [m]."""
+    """Radius of the largest other robot; 0 and below: of the largest there is [m]."""
     strangers_mps: Annotated[float, Field(ge=-1.0, le=1000.0), NUMBER] = GUARDING.strangers_mps
     """How fast those are that are no robots and do not yield, people: a robot stands before they can reach it; below 0:
     as fast as the fastest disc that moves in this world, 0: there are none [m/s]."""
     strangers_m: Annotated[float, Field(ge=-1.0, le=1000.0), NUMBER] = GUARDING.strangers_m
-    """Radius of the smallest of them; below 0: of the smallest disc that moves in this world, 0.2 m without one [m]."""
+    """Radius of the smallest of them; 0 and below: of the smallest disc that moves here, 0.2 m without one [m]."""
 
 
 class SafetyModel(_Strict):

@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from swarmscope.errors import ConfigError
 from swarmscope.onboard.body import Body
 from swarmscope.onboard.data_sheets import check_horizon
 from swarmscope.onboard.planners import Planner, load_planner
 from swarmscope.onboard.rig import Guarding, Rig, Safety, Sharing, make_rig
 from swarmscope.onboard.sensor import Sensor, all_round
 from swarmscope.scenarios.places import is_packaged, map_path
-from swarmscope.scenarios.scenario import NoiseModel, PlannerModel, RobotModel, Scenario
+from swarmscope.scenarios.scenario import GuardModel, NoiseModel, PlannerModel, RobotModel, Scenario
 from swarmscope.sim.lidar import make_beams
 from swarmscope.sim.loop import Setting
 from swarmscope.sim.moving import STANDSTILL, Moving, moving_in, top_speed
@@ -23,6 +24,9 @@ from swarmscope.sim.world import compile_world
 from swarmscope.tasks import Setup, load_task
 from swarmscope.tasks._contract import all_options
 from swarmscope.user_files import is_file_name, whole_path
+
+MOST_PLACES = 50_000_000
+"""Of things that move, over a run: 0.8 GB."""
 
 
 def complete(scenario: Scenario, run_files: bool = True) -> dict[str, Any]:
@@ -108,6 +112,12 @@ def body_of(sheet: RobotModel) -> Body:
     return Body(**sheet.model_dump(include=set(Body._fields)))
 
 
+def _is_open(guard: GuardModel, key: str) -> bool:
+    """Tell whether what is said of a key leaves it open; 0 m/s is an answer, 0 m is none."""
+    value: float = getattr(guard, key)
+    return value < 0.0 or (value == 0.0 and not key.endswith("_mps"))
+
+
 def _about_others(scenario: Scenario, moving: Moving) -> dict[str, float]:
     """Return what the guard has to know of other robots and of what moves, as far as the scenario does not say it."""
     sheets, guard = scenario.sheets if isinstance(scenario.robot, list) else [], scenario.guard
@@ -119,7 +129,7 @@ def _about_others(scenario: Scenario, moving: Moving) -> dict[str, float]:
         found |= {"others_smallest_m": min(radii), "others_largest_m": max(radii)}
         found["others_mps"] = max(sheet.v_max_mps for sheet in sheets)
     said = guard.model_fields_set
-    return {key: value for key, value in found.items() if key not in said or getattr(guard, key) < 0.0}
+    return {key: value for key, value in found.items() if key not in said or _is_open(guard, key)}
 
 
 @lru_cache(maxsize=8)
@@ -164,6 +174,8 @@ def make_setting(scenario: Scenario, setup: Setup, threads: int = 1) -> Setting:
     planner = planner_of(scenario.planner)
     ticks = scenario.limit_s * scenario.lidar.rate_hz
     moving, dt = moving_in(setup.world), 1.0 / scenario.lidar.rate_hz
+    if ticks * (len(moving.radius) + len(moving.closed)) > MOST_PLACES:
+        raise ConfigError("limit_s", f"{ticks:g} ticks of {len(moving.radius)} discs are too many to be kept: lower it")
     rigs = make_rigs_of(scenario, moving)
     for rig in dict(zip(map(id, rigs), rigs, strict=True)).values():
         check_horizon(rig, dt)

@@ -214,7 +214,7 @@ def run(
     chunks: list[Records] = []
     pool = _Pool(n, setting.threads)
     plan_us: list[float] = []
-    went = _Went(sim)
+    doors: list[np.ndarray] = []
     sample_every = max(1, ticks // PLAN_SAMPLES)
     index_robots(sim)
     step_all(0, 0)  # loads the kernels, so that no step's time contains that
@@ -225,7 +225,7 @@ def run(
         row = tick % CHUNK
         if row == 0:
             chunks.append(new_records(min(CHUNK, ticks - tick), n, beams))
-        went.note(tick)
+        doors.append(sim.moving.closed.copy())
         if sensed is not None:
             sensed(held, tick)
         _tell(setting, sim, memory)
@@ -258,8 +258,8 @@ def run(
         robots=sim.robots,
         shared=swarm.shared,
         links=sim.links[: sim.links_n[0]].copy(),
-        discs=np.array(went.discs).reshape(tick, -1, 2),
-        doors=np.array(went.doors, np.uint8).reshape(tick, -1),
+        discs=_ways(setting, tick),
+        doors=np.array(doors, np.uint8).reshape(tick, -1),
         choices=sim.choices[: sim.choices_n[0]].copy(),
         plan_us=np.array(plan_us),
         wall_s=wall_s,
@@ -291,22 +291,12 @@ def _stepper(setting: Setting, swarm: Swarm, memory: np.ndarray) -> Callable[[in
     return step_all
 
 
-class _Went:
-    """Keeps where what moves by itself has been."""
-
-    def __init__(self, sim: Sim) -> None:
-        self._moving, self._dt = sim.moving, sim.clock.dt
-        self._place = np.zeros((len(sim.moving.radius), 2))
-        self.discs: list[np.ndarray] = []
-        self.doors: list[np.ndarray] = []
-
-    def note(self, tick: int) -> None:
-        """Keep it for a tick."""
-        if len(self._place):
-            write_places(self._moving, tick * self._dt, self._place)
-            self.discs.append(self._place.copy())
-        if len(self._moving.closed):
-            self.doors.append(self._moving.closed.copy())
+def _ways(setting: Setting, ticks: int) -> np.ndarray:
+    """Return where the discs that move were at each tick (T, D, 2) [m]."""
+    places = np.zeros((ticks if len(setting.moving.radius) else 0, len(setting.moving.radius), 2))
+    for tick in range(len(places)):
+        write_places(setting.moving, tick * setting.dt, places[tick])
+    return places if len(places) else np.zeros((ticks, 0, 2))
 
 
 def _tell(setting: Setting, sim: Sim, memory: np.ndarray) -> None:

@@ -335,6 +335,8 @@ def _held_by_strangers(see: View, v: float, way: Way, near: Near) -> bool:
         s *= max(0.5, 1.0 - SIGMAS * rig.sensor.range_sigma)
         c, si = rig.cos[n], rig.sin[n]
         robots = _is_robots(see, s * c, s * si)
+        if not robots and s < rig.body.radius_m:
+            return True  # who has walked into a robot may go on
         if robots:
             s *= behind
         if (robots or see.standing[n] != STANDS) and not leaves_room(s * c, s * si, s, way, coming, rig):

@@ -219,10 +219,23 @@ def was_free(see: View, x: float, y: float) -> bool:
     for k in range(see.shared["frames_n"]):
         pose = see.frames.poses[k]
         px, py = x - pose[0], y - pose[1]
-        far = math.sqrt(px * px + py * py) + _astray(pose, reach, see.rig)
-        if far < core:
+        away, off = math.sqrt(px * px + py * py), _astray(pose, reach, see.rig)
+        if away + off < core:
             return True
         n = nearest_beam(px, py, pose[2], sensor) - sensor.first
-        if 0 <= n < sensor.field and far <= abs(see.frames.scans[k, n]):
+        aside = int(math.ceil(off / max(away, 1e-9) / sensor.increment)) if off > 0.0 else 0
+        if aside <= n < sensor.field - aside and _all_reach(see.frames.scans[k], n - aside, n + aside, away + off):
             return True
     return False
+
+
+@jit_inner
+def _all_reach(scan: np.ndarray, first: int, last: int, far: float) -> bool:
+    """Tell whether all beams from ``first`` to ``last`` of a kept scan reach so far [m]: any may have looked there."""
+    reach = math.inf
+    for n in range(first, last + 1):
+        s = abs(scan[n])
+        reach = min(reach, s) if s >= 0.0 else -1.0  # NaN: nobody knows
+        if reach < 0.0:
+            break
+    return bool(far <= reach)

@@ -246,7 +246,9 @@ def field_picture(material: Material) -> Picture:
     planner = material.leading()
     runs: list[Run] = material.of("all", planner)
     keys = runs[0].config if runs else material.experiment.scenario
-    robot = RobotModel.model_validate(keys.get("robot", {}))
+    sheets = keys.get("robot", {})
+    sheet = sheets[0] if isinstance(sheets, list) else sheets
+    robot = RobotModel.model_validate({key: value for key, value in sheet.items() if key != "start_s"})
     sigma = protection_model(body_of(robot)).sigma_a
     params = _defaults(material, planner) | dict(material.planner_keys(planner).get("params", {}))
     w_i = float(params.get("w_i", 1.0))
