@@ -29,10 +29,11 @@ help: ## print this list
 run: setup ## set up and let 15 robots cross the forest (results in runs/first)
 	$(BIN)/swarmscope run --task T1 --planner nav-scope --robots 15 --seed 0 --out $(OUT)
 
-test: setup-dev ## set up, check and run all tests
+test: $(VENV)/.package ## set up, check and run all tests
 	@echo "compiling what is not compiled yet: minutes after a change, seconds after that"
 	@$(BIN)/python tests/warm.py planners & planners=$$!; \
-	{ $(BIN)/python tests/warm.py world && $(MAKE) --no-print-directory check; } || { kill $$planners; exit 1; }; \
+	{ $(MAKE) --no-print-directory setup-dev && $(BIN)/python tests/warm.py world && \
+	  $(MAKE) --no-print-directory check; } || { kill $$planners; exit 1; }; \
 	wait $$planners
 	$(BIN)/python -m pytest -rs -n $(WORKERS) $(PYTEST_ARGS)
 

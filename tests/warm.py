@@ -27,13 +27,21 @@ SCENARIO = {"task": {"name": "T1"}, "robots": 2}
 
 def planners() -> None:
     """Let every planner take a step."""
+    waiting = [name for name in planner_names() if not _step(name)]
+    for name in waiting:  # what it needs may have been installed meanwhile
+        if not _step(name):
+            print(f"{name}: not compiled, something is missing that it needs")
+
+
+def _step(name: str) -> bool:
+    """Let a planner take a step; return whether all that it needs is there."""
     rig = make_rig_of(parse_scenario(SCENARIO, "warm"))
-    for name in planner_names():
-        try:
-            planner = load_planner(name)
-            planner.step_all(0, 1, Held(new_swarm(1, rig)), planner.new_memory(1), planner.params())
-        except MissingExtraError as error:
-            print(error)
+    try:
+        planner = load_planner(name)
+        planner.step_all(0, 1, Held(new_swarm(1, rig)), planner.new_memory(1), planner.params())
+    except MissingExtraError:
+        return False
+    return True
 
 
 def world() -> None:
