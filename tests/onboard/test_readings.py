@@ -10,7 +10,7 @@ import pytest
 from robots import OPEN, Driver, LaserScan, box_left, brakes, new_robot
 from swarmscope.errors import ConfigError
 from swarmscope.onboard.lidar import Lidar, check_lidar, lay_out
-from swarmscope.onboard.readings import are_millimetres, must_be_millimetres, own_rays
+from swarmscope.onboard.readings import are_millimetres, must_be_millimetres, own_rays, translate
 
 POSTS = ((-46.5, -43.5), (43.5, 46.5), (133.5, 136.5), (-136.5, -133.5))
 
@@ -131,3 +131,9 @@ def test_when_readings_are_millimetres():
 def test_what_is_no_reading_or_mask_is_refused(field, value):
     with pytest.raises(ConfigError, match=f"lidar.{field}"):
         check_lidar(Lidar(**{field: value}))
+
+
+def test_a_value_beyond_all_numbers_of_a_scan_means_no_return_and_warns_of_nothing(recwarn):
+    values = np.array([1.0, 0.0, np.inf], np.float32)
+    translate(values, [0.0, 1e300])
+    assert values.tolist() == [1.0, np.inf, np.inf] and not recwarn.list

@@ -31,7 +31,9 @@ def own_rays(layout: Layout, masks_deg: Sequence[tuple[float, float]], facing: f
 def translate(values: np.ndarray, no_return: Sequence[float]) -> None:
     """Make the readings (B,) that say that there was no return +inf, in place; NaN may be one of those values."""
     for value in no_return:
-        values[np.isnan(values) if math.isnan(value) else values == values.dtype.type(value)] = np.inf
+        with np.errstate(over="ignore"):  # beyond what float32 can hold: inf, which means no return anyway
+            said = values.dtype.type(value)
+        values[np.isnan(values) if math.isnan(value) else values == said] = np.inf
 
 
 def are_millimetres(values: np.ndarray, least_m: float, most_m: float) -> bool:
