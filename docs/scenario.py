@@ -36,6 +36,8 @@ swarmscope.simulate("T1", radio__loss=0.2, planner__params__w_i=0)      # the sa
 ```
 
 A key that does not exist, or a value out of bounds, is an error that names the place and the nearest key.
+
+`robot` may be a list with these keys for each robot, and `start_s` besides [s]; obstacles have keys of their own: both in [maps.md](maps.md).
 """
 
 RADIO = """## What the radio does with packets
