@@ -5,7 +5,7 @@ import pytest
 
 from swarmscope.errors import ConfigError, UnknownNameError, UnsolvableWorldError
 from swarmscope.sim.world import Circle, Grid, Polygon, Wall, WorldSpec
-from swarmscope.tasks import Setup, check_setup, load_task, place_on_map, task_names
+from swarmscope.tasks import Setup, check_setup, load_task, place_on_map, setup_of_task, task_names
 from swarmscope.tasks._forest import ForestOptions, Places, lines, plant, rings
 
 TASKS = task_names()
@@ -179,3 +179,8 @@ def test_places_on_a_map_that_are_impossible() -> None:
         place_on_map(two_rooms(), 4, robots=2, radius=0.15, min_distance=50.0)
     with pytest.raises(UnsolvableWorldError, match="no room"):
         place_on_map(two_rooms(), 4, robots=60, radius=0.5, min_distance=1.0)
+
+
+def test_options_of_which_nothing_can_be_made_are_an_error_of_theirs():
+    with pytest.raises(ConfigError, match=r"^task\.options: corridor cannot be made of them: points 0 and 1"):
+        setup_of_task("corridor", {"length_m": 0.0}, 0, 2, 0.15)

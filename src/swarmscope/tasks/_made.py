@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import ValidationError
 
 from swarmscope.closure import PACKAGE
-from swarmscope.errors import InputFileError
+from swarmscope.errors import ConfigError, InputFileError
 from swarmscope.tasks._check import check_setup
 from swarmscope.tasks._contract import Setup, all_options, load_task, task_file
 from swarmscope.user_files import guarded
@@ -24,7 +25,11 @@ def setup_of_task(name: str, options: Mapping[str, Any], seed: int, robots: int,
     task, file = load_task(name), task_file(name)
     chosen: dict[str, Any] = all_options(task, options)
     if file.is_relative_to(PACKAGE):
-        return task.make(seed, robots, radius, **chosen)
+        try:
+            return task.make(seed, robots, radius, **chosen)
+        except ValidationError as error:  # of an obstacle that no options should make, were it not for extremes
+            why = str(error.errors()[0]["msg"]).removeprefix("Value error, ")
+            raise ConfigError("task.options", f"{task.NAME} cannot be made of them: {why}") from None
     made = guarded(lambda: task.make(seed, robots, radius, **chosen), file)
     setup = _checked(made, robots, file)
     check_setup(setup, radius)
