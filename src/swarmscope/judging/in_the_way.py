@@ -25,15 +25,10 @@ def who_is_in_the_way(setup: Setup, places: np.ndarray, radii: np.ndarray, robot
         return []
     here = Setup(setup.world, places[robot][None, :], setup.goals[robot][None, :])
     reach = Reach(float(radii[robot]), KEPT_M, RESOLUTION_M)
-    others = np.column_stack([places, radii])
-    others[robot, 2] = 0.0
-    others[robot, :2] = np.inf
-    listed = np.delete(others, robot, axis=0)
-    if reachable_past(here, reach, listed) or not reachable_past(here, reach, listed[:0]):
+    everybody = np.column_stack([places, radii])
+    others = np.delete(everybody, robot, axis=0)
+    if reachable_past(here, reach, others) or not reachable_past(here, reach, others[:0]):
         return []
-    near = np.argsort(np.hypot(*(others[:, :2] - places[robot]).T), kind="stable")
-    found = []
-    for other in near.tolist():
-        if other != robot and reachable_past(here, reach, np.delete(others, [robot, other], axis=0)):
-            found.append(other)
-    return found
+    near = np.argsort(np.hypot(*(places - places[robot]).T), kind="stable").tolist()
+    near.remove(robot)
+    return [n for n in near if reachable_past(here, reach, np.delete(everybody, [robot, n], axis=0))]

@@ -16,6 +16,7 @@ from xml.etree.ElementTree import Element, ParseError, TreeBuilder, XMLParser
 
 from pydantic import ValidationError
 
+from swarmscope.bounds import number_of
 from swarmscope.errors import InputFileError
 from swarmscope.sim.world import Circle, Obstacle, Polygon, WorldSpec
 from swarmscope.texts import read_text
@@ -43,23 +44,33 @@ class _Plain(TreeBuilder):
         raise ValueError(f"declares the document type '{name}', which no world file needs")
 
 
-def parse_xml(text: str) -> Element:
-    """Return the root of XML without a document type. Errors: ParseError, ValueError."""
+def world_in(text: str) -> Element:
+    """Return the ``<world>`` of a world file that needs no other file. Errors: ParseError, ValueError."""
     parser = XMLParser(target=_Plain())  # noqa: S314  document types, and so entities, are refused
     parser.feed(text)
-    return parser.close()
+    root: Element = parser.close()
+    world = root.find("world") if root.tag == "sdf" else None
+    if world is None:
+        raise ValueError(f"is no world file of Gazebo: no <sdf> with a <world>, but <{root.tag[:40]}>")
+    for uri in world.iterfind("include/uri"):
+        if (uri.text or "").strip() not in HARMLESS:
+            raise ValueError(f"includes {uri.text}, which is another file; only what is written out is read")
+    return world
+
+
+def numbers_in(text: str | None, count: int, where: str) -> list[float]:
+    """Return the ``count`` numbers that a text consists of. Errors: ValueError."""
+    words = (text or "").split()
+    values = [number_of(word) for word in words]
+    if len(values) != count or not all(map(math.isfinite, values)):
+        raise ValueError(f"{where} must be {count} finite number{'s' * (count > 1)}, not '{' '.join(words)[:60]}'")
+    return values
 
 
 def load_world(path: Path) -> WorldSpec:
     """Return what stands and moves in a world file. Errors: InputFileError."""
     try:
-        root = parse_xml(EMPTY_FRAME.sub("<pose>", read_text(path)))
-        world = root.find("world") if root.tag == "sdf" else None
-        if world is None:
-            raise ValueError(f"is no world file of Gazebo: no <sdf> with a <world>, but <{root.tag[:40]}>")
-        for uri in world.iterfind("include/uri"):
-            if (uri.text or "").strip() not in HARMLESS:
-                raise ValueError(f"includes {(uri.text or '')[:60]}, which is another file")
+        world = world_in(EMPTY_FRAME.sub("<pose>", read_text(path)))
         obstacles = [one for model in world.findall("model") for one in _model(model, path)]
         if not obstacles:
             raise ValueError("holds no cylinder and no box")
@@ -75,25 +86,25 @@ def load_world(path: Path) -> WorldSpec:
 def _model(model: Element, path: Path) -> Iterator[Obstacle]:
     """Return the obstacles of a model."""
     name = model.get("name", "")[:60]
-    x, y, _, roll, pitch, yaw = _numbers(model.findtext("pose") or STANDS, 6, f"model '{name}': <pose>")
+    x, y, _, roll, pitch, yaw = numbers_in(model.findtext("pose") or STANDS, 6, f"model '{name}': <pose>")
     if max(abs(roll), abs(pitch)) > 1e-6:
         raise ValueError(f"model '{name}' is tilted")
     plugin = model.find("plugin")
     for part in ("link", "link/collision"):
         for inner in model.iterfind(part):
-            aside = _numbers(inner.findtext("pose") or STANDS, 6, f"model '{name}': <pose>")
+            aside = numbers_in(inner.findtext("pose") or STANDS, 6, f"model '{name}': <pose>")
             if any(aside[k] for k in (0, 1, 3, 4, 5)):
                 raise ValueError(f"model '{name}': its <{inner.tag}> stands aside of it, which is not read")
     if model.find("model") is not None or model.find("include") is not None:
         raise ValueError(f"model '{name}' holds other models, which are not read")
     for shape in model.iterfind("link/collision/geometry/*"):
         if shape.tag == "cylinder":
-            radius = _numbers(shape.findtext("radius"), 1, f"model '{name}': <radius>")[0]
+            radius = numbers_in(shape.findtext("radius"), 1, f"model '{name}': <radius>")[0]
             yield _cylinder(x, y, radius, None if plugin is None else plugin.get("filename", ""), path)
         elif shape.tag == "box" and plugin is not None:
             raise ValueError(f"model '{name}' is a box that moves; cylinders are read")
         elif shape.tag == "box":
-            length, width, _ = _numbers(shape.findtext("size"), 3, f"model '{name}': <size>")
+            length, width, _ = numbers_in(shape.findtext("size"), 3, f"model '{name}': <size>")
             c, s, u, v = math.cos(yaw), math.sin(yaw), 0.5 * length, 0.5 * width
             corners = ((u, v), (-u, v), (-u, -v), (u, -v))
             yield Polygon(points=[(x + c * a - s * b, y + s * a + c * b) for a, b in corners])
@@ -130,14 +141,14 @@ def _source(path: Path, name: str) -> Path:
 
 def _key_frames(source: Path) -> list[tuple[float, float, float]]:
     """Return when a plugin's model is where: seconds from 0, x, y [m]."""
-    found: list[tuple[float, float, float]] = []
     text = read_text(source)
-    for match in KEY_FRAME.finditer(text):
-        t, x, y = (float(number) for number in match.groups())
+    written = KEY_FRAME.findall(text)
+    if text.count("CreateKeyFrame(") != len(written):
+        raise ValueError(f"{source.name} holds key frames that are not written in numbers")
+    found: list[tuple[float, float, float]] = []
+    for t, x, y in (map(float, numbers) for numbers in written):
         if not found or t > found[-1][0] + 1e-9:
             found.append((t, x, y))
-    if text.count("CreateKeyFrame(") != len(KEY_FRAME.findall(text)):
-        raise ValueError(f"{source.name} holds key frames that are not written in numbers")
     if len(found) < 2:
         raise ValueError(f"{source.name} holds no two key frames one after the other")
     return [(t - found[0][0], x, y) for t, x, y in found]
@@ -152,14 +163,3 @@ def _bounds(obstacles: list[Any]) -> tuple[float, float, float, float]:
 
 def _extent(one: Circle | Polygon) -> list[tuple[float, float]]:
     return [*one.points] if isinstance(one, Polygon) else [one.center, *(one.way or [])]
-
-
-def _numbers(text: str | None, count: int, where: str) -> list[float]:
-    words = (text or "").split()
-    try:
-        values = [float(word) for word in words]
-    except ValueError:
-        values = []
-    if len(values) != count or not all(map(math.isfinite, values)):
-        raise ValueError(f"{where} must be {count} finite numbers, not '{' '.join(words)[:60]}'")
-    return values
