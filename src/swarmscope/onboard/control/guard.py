@@ -11,8 +11,6 @@ brakes straight on, which the previous tick has shown to be free.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
-
 import numpy as np
 
 from swarmscope._jit import jit, jit_inline, jit_inner
@@ -49,15 +47,6 @@ STANDS_MPS = 1e-6
 SOME_LOSSES, MOST_LOSSES = 0.2, 0.35
 """Shares of returns lost from scan to scan from which on a robot slows down, and at which it stands. Of beams lost by
 chance with probability p a share p^3 is lost together with both beams beside them."""
-
-
-class Near(NamedTuple):
-    """What could matter in this tick."""
-
-    beams: int
-    """How many, listed in ``View.edges``."""
-    nearest: float
-    """The smallest range among them [m]."""
 
 
 @jit_inline
@@ -167,8 +156,11 @@ def speed_of_horizon(rig: Rig, dt: float) -> float:
 
 
 @jit_inner
-def _near(see: View, speed: float) -> Near:
-    """Collect what could matter for a robot that is at most so fast until the next tick."""
+def _near(see: View, speed: float) -> int:
+    """List in ``see.edges`` the beams that could matter for a robot that is at most so fast until the next tick.
+
+    Return how many there are.
+    """
     rig, ranges, near = see.rig, see.scan, see.edges
     body, guarding = rig.body, rig.guarding
     delay = see.percept["dt_s"] + guarding.latency_s
@@ -182,20 +174,17 @@ def _near(see: View, speed: float) -> Near:
         others = strangers(speed, see.percept["dt_s"], rig)
         limit = max(limit, max(others.touch, body.radius_m + guarding.clearance_m) + way + brake + others.met)
     limit /= max(0.5, 1.0 - SIGMAS * rig.sensor.range_sigma - rig.sensor.increment)
-    least, far = least_range(rig), np.float32(limit + ROUNDING_M)
+    far = np.float32(limit + ROUNDING_M)
     count = 0
-    nearest = math.inf
     for n in range(rig.sensor.beams):
         if (not ranges[n] >= far) | (see.unseen[n] & BROKEN != 0):
             near[count] = n
             count += 1
-            if least <= ranges[n] < nearest:
-                nearest = ranges[n]
-    return Near(count, nearest)
+    return count
 
 
 @jit_inner
-def _held_by(see: View, v: float, w: float, near: Near) -> int:
+def _held_by(see: View, v: float, w: float, near: int) -> int:
     """Return what holds a robot back from the command (v, w): FREE, or the reason.
 
     The way keeps clear of every return, out of others' halves, and within what was seen.
@@ -209,7 +198,7 @@ def _held_by(see: View, v: float, w: float, near: Near) -> int:
     if rig.guarding.others_mps > 0.0 and not _clear_of_tracks(see, way, others):
         return R_HELD_ROBOT
     bulge, enough = _bulge(v, w, see), matters_up_to(way, others)
-    for k in range(near.beams):
+    for k in range(near):
         n = int(see.edges[k])
         held = _held_by_beam(see, n, way, others, bulge, enough)
         if held == R_HELD_THING and rig.sensor.field > 0 and is_blurred(see, n):
@@ -217,7 +206,7 @@ def _held_by(see: View, v: float, w: float, near: Near) -> int:
             return R_HELD_UNSEEN
         if held != FREE:
             return held
-    held = _held_by_unseen(see, way, bulge, near)
+    held = _held_by_unseen(see, way, bulge)
     if rig.guarding.strangers_mps > 0.0 and _held_by_strangers(see, v, way, near):
         held = R_HELD_STRANGER
     if held == FREE and way.turns and rig.guarding.latency_s > 0.0:
@@ -226,14 +215,13 @@ def _held_by(see: View, v: float, w: float, near: Near) -> int:
 
 
 @jit_inner
-def _held_by_unseen(see: View, way: Way, bulge: float, near: Near) -> int:
+def _held_by_unseen(see: View, way: Way, bulge: float) -> int:
     """Return whether a way leads where nobody has looked: FREE, or the reason."""
     rig = see.rig
     if rig.sensor.field == 0:
         return FREE
     kept, _ = _kept_from(rig.body.radius_m, bulge, rig)
-    front = kept + reaches_between(rig.body.radius_m)
-    x, y = out_of_sight(see, way, min(front, near.nearest - 1e-6))
+    x, y = out_of_sight(see, way, kept + reaches_between(rig.body.radius_m))
     if x == 0.0 and y == 0.0:
         return FREE
     see.shared["unseen_left"] = y > 0.0
@@ -241,17 +229,17 @@ def _held_by_unseen(see: View, way: Way, bulge: float, near: Near) -> int:
 
 
 @jit
-def _held_at_once(see: View, way: Way, bulge: float, near: Near) -> int:
+def _held_at_once(see: View, way: Way, bulge: float, near: int) -> int:
     """Return what of all that stands holds a robot back that heeds its command at once, not as late as it may be.
 
     A way that turns later is another one, not just a longer one.
     """
-    for k in range(near.beams):
+    for k in range(near):
         n = int(see.edges[k])
         s, need = _nearest_of(see, n, bulge)
         if _meets(see, n, s, need, way):
             return R_HELD_THING
-    return _held_by_unseen(see, way, bulge, near)
+    return _held_by_unseen(see, way, bulge)
 
 
 @jit_inline
@@ -314,7 +302,7 @@ def _held_by_beam(see: View, n: int, way: Way, others: Others, bulge: float, eno
 
 
 @jit
-def _held_by_strangers(see: View, v: float, way: Way, near: Near) -> bool:
+def _held_by_strangers(see: View, v: float, way: Way, near: int) -> bool:
     """Tell whether somebody who does not yield could reach a robot that takes this way before it stands.
 
     Whoever comes is a return that does not stand, is hidden behind one, or walks through another robot: one that is
@@ -325,7 +313,7 @@ def _held_by_strangers(see: View, v: float, way: Way, near: Near) -> bool:
     behind = max(1.0, coming.smallest / rig.guarding.others_largest_m)
     if _nearest_moving(see, near) < enough:
         behind = 1.0
-    for k in range(near.beams):
+    for k in range(near):
         n = int(see.edges[k])
         s = float(see.scan[n])
         if not s >= least:
@@ -347,10 +335,10 @@ def _held_by_strangers(see: View, v: float, way: Way, near: Near) -> bool:
 
 
 @jit_inner
-def _nearest_moving(see: View, near: Near) -> float:
+def _nearest_moving(see: View, near: int) -> float:
     """Return the smallest range of a return that moves and is no robot's [m]."""
     rig, best = see.rig, math.inf
-    for k in range(near.beams):
+    for k in range(near):
         n = int(see.edges[k])
         s = float(see.scan[n])
         if see.standing[n] == MOVES and s < best and not _is_robots(see, s * rig.cos[n], s * rig.sin[n]):

@@ -6,6 +6,7 @@ import math
 
 from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.onboard.control.way import Way, corner_of
+from swarmscope.onboard.perception.beams import beam_at, nearest_beam
 from swarmscope.onboard.perception.frames import in_view, was_free
 from swarmscope.onboard.reasons import R_HELD_UNSEEN
 from swarmscope.onboard.view import View
@@ -63,10 +64,31 @@ def look_round(see: View, v: float, w: float, why: int) -> tuple[float, float, i
 @jit_inner
 def _unseen_front(see: View, x: float, y: float, fx: float, fy: float) -> tuple[float, float]:
     """Return a place on the front of the body at (x, y), which looks along f [m], that nobody has seen free."""
-    places = int(math.ceil(FRONT_RAD * math.sqrt(fx * fx + fy * fy) / GRAIN_M))
+    need = math.sqrt(fx * fx + fy * fy)
+    places = int(math.ceil(FRONT_RAD * need / GRAIN_M))
     for k in range(-places, places + 1):
         a = k * FRONT_RAD / places
         px, py = x + fx * math.cos(a) - fy * math.sin(a), y + fx * math.sin(a) + fy * math.cos(a)
-        if not in_view(px, py, see) and not was_free(see, px, py):
+        if not (in_view(px, py, see) or was_free(see, px, py) or _is_shut(see, px, py, need)):
             return px, py
     return 0.0, 0.0
+
+
+@jit_inner
+def _is_shut(see: View, px: float, py: float, need: float) -> bool:
+    """Tell whether something is known before (px, py) that is nearer than ``need`` already, and nothing else before it.
+
+    The guard lets the body come no closer to it (``guard._meets``). What a return is of reaches to the next place.
+    """
+    sensor, reach = see.rig.sensor, math.sqrt(px * px + py * py)
+    middle = nearest_beam(px, py, 0.0, sensor)
+    beside = int(math.ceil(0.5 * GRAIN_M / need / sensor.increment))
+    s = math.inf
+    for n in range(middle - beside, middle + beside + 1):
+        k = beam_at(n, sensor)
+        if k >= 0:
+            s = min(s, see.scan[k])
+    if not s < min(reach, need):
+        return False
+    part = (s - 1e-6) / reach
+    return was_free(see, part * px, part * py)
