@@ -11,6 +11,7 @@ brakes straight on, which the previous tick has shown to be free.
 from __future__ import annotations
 
 import math
+
 import numpy as np
 
 from swarmscope._jit import jit, jit_inline, jit_inner
