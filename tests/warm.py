@@ -51,7 +51,7 @@ def world() -> None:
     sim, swarm = begin(setting)
     index_robots(sim)
     sense(sim, 0, 0, len(setting.starts))
-    world_phase(Held(sim), swarm.safe, new_records(1, len(setting.starts), 0), 0, False, 0)
+    world_phase(Held(sim), swarm.safe, Held(new_records(1, len(setting.starts), 0)), 0, False, 0)
 
 
 if __name__ == "__main__":

@@ -116,7 +116,7 @@ def test_a_restart_forgets_everything_and_gets_a_new_number_and_a_clock_from_zer
     swarm.decisions["n_out"] = 3
     sim.robots["down_until"][2] = 30
     for rows, blank in pairs:
-        forget(sim, 29, rows, blank)
+        forget(sim.robots, 29, rows, blank)
     fresh = planner.new_memory(robots)
     for i in range(robots):
         assert (memory[i].tobytes() == fresh[i].tobytes()) == (i == 2)
@@ -124,7 +124,7 @@ def test_a_restart_forgets_everything_and_gets_a_new_number_and_a_clock_from_zer
         assert (swarm.decisions["v"][i], swarm.decisions["n_out"][i]) == ((0.0, 0) if i == 2 else (0.4, 3))
     memory["log_n"] = 6
     for rows, blank in pairs:
-        forget(sim, 30, rows, blank)  # it runs again
+        forget(sim.robots, 30, rows, blank)  # it runs again
     assert (memory["log_n"] == 6).all()
 
     sim = robots_of(Faults(restarts_per_h=3600.0, restart_s=1.0), robots)

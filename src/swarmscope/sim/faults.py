@@ -98,10 +98,10 @@ def _lose_mail(sim: Sim, i: int) -> None:
 
 
 @jit
-def forget(sim: Sim, tick: int, rows: np.ndarray, blank: np.ndarray) -> None:
+def forget(robots: np.ndarray, tick: int, rows: np.ndarray, blank: np.ndarray) -> None:
     """Make the ``rows (N, B)`` of robots that are switched off those of robots that have seen nothing: ``blank``."""
-    for i in range(sim.robots.size):
-        if tick < sim.robots[i]["down_until"]:
+    for i in range(robots.size):
+        if tick < robots[i]["down_until"]:
             for b in range(rows.shape[1]):
                 rows[i, b] = blank[i % blank.shape[0], b]
 

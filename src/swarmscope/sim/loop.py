@@ -153,11 +153,11 @@ def _log_choices(sim: Sim, tick: int) -> None:
 
 @jit
 def world_phase(
-    held: Held[Sim], safe: np.ndarray, records: Records, row: int, with_scans: bool, tick: int
+    held: Held[Sim], safe: np.ndarray, records: Held[Records], row: int, with_scans: bool, tick: int
 ) -> bool:
     """Record tick ``tick``, then exchange, move, judge and sense the next; return whether everybody is done."""
     sim = held.what
-    record_tick(sim, safe, records, row, with_scans, tick)
+    record_tick(sim, safe, records.what, row, with_scans, tick)
     exchange(sim, tick)
     move(sim, tick, 0, sim.robots.size)
     return settle(sim, tick) or _sense_next(sim, tick)
@@ -225,6 +225,7 @@ def run(
         row = tick % CHUNK
         if row == 0:
             chunks.append(new_records(min(CHUNK, ticks - tick), n, beams))
+            records = Held(chunks[-1])
         doors.append(sim.moving.closed.copy())
         if sensed is not None:
             sensed(held, tick)
@@ -234,10 +235,10 @@ def run(
         else:
             pool.each(step_all)
         for rows, blank in forgotten:
-            forget(sim, tick, rows, blank)
+            forget(sim.robots, tick, rows, blank)
         last = between is not None and between(held, tick)
         if pool.size == 1:
-            done = world_phase(held, swarm.safe, chunks[-1], row, beams > 0, tick)
+            done = world_phase(held, swarm.safe, records, row, beams > 0, tick)
         else:
             record_tick(sim, swarm.safe, chunks[-1], row, beams > 0, tick)
             exchange(sim, tick)
