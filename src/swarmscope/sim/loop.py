@@ -211,7 +211,7 @@ def run(
     step_all = _stepper(setting, swarm, memory)
     beams = sim.ranges.shape[1] if setting.record_scans else 0
     ticks = math.ceil(setting.limit_s / setting.dt - 1e-9)
-    chunks: list[Records] = []
+    chunks: list[Held[Records]] = []
     pool = _Pool(n, setting.threads)
     plan_us: list[float] = []
     doors: list[np.ndarray] = []
@@ -224,8 +224,7 @@ def run(
     while tick < ticks and not (done or last):
         row = tick % CHUNK
         if row == 0:
-            chunks.append(new_records(min(CHUNK, ticks - tick), n, beams))
-            records = Held(chunks[-1])
+            chunks.append(Held(new_records(min(CHUNK, ticks - tick), n, beams)))
         doors.append(sim.moving.closed.copy())
         if sensed is not None:
             sensed(held, tick)
@@ -238,9 +237,9 @@ def run(
             forget(sim.robots, tick, rows, blank)
         last = between is not None and between(held, tick)
         if pool.size == 1:
-            done = world_phase(held, swarm.safe, records, row, beams > 0, tick)
+            done = world_phase(held, swarm.safe, chunks[-1], row, beams > 0, tick)
         else:
-            record_tick(sim, swarm.safe, chunks[-1], row, beams > 0, tick)
+            record_tick(sim, swarm.safe, chunks[-1].what, row, beams > 0, tick)
             exchange(sim, tick)
             pool.each(partial(move, sim, tick))
             done = settle(sim, tick)
@@ -341,9 +340,9 @@ class _Pool:
             self._pool.shutdown()
 
 
-def _join(chunks: list[Records], ticks: int) -> Records:
+def _join(chunks: list[Held[Records]], ticks: int) -> Records:
     """Return the chunks as one, cut to the ticks that were run."""
-    return Records(*(np.concatenate(parts)[:ticks] for parts in zip(*chunks, strict=True)))
+    return Records(*(np.concatenate(parts)[:ticks] for parts in zip(*(held.what for held in chunks), strict=True)))
 
 
 def _row_bytes(swarm: Swarm, memory: np.ndarray) -> int:
