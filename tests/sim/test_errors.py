@@ -10,7 +10,11 @@ import pytest
 from helpers import DT, beams_of, make_sensor, place_sim, rig_of, world_of
 from swarmscope.onboard.perception.reproject import move_on
 from swarmscope.onboard.view import python_view
+from swarmscope.scenarios.places import make_setup
+from swarmscope.scenarios.read import parse_scenario
+from swarmscope.scenarios.to_kernels import make_setting
 from swarmscope.sim.cells import index_robots
+from swarmscope.sim.loop import run
 from swarmscope.sim.sensing import sense
 from swarmscope.sim.state import Noise
 from swarmscope.sim.world import Circle
@@ -306,3 +310,14 @@ def test_a_late_scan_that_is_moved_on_shows_what_is_seen_from_here(age):
         assert near.sum() > 5
     assert max(moved) < 0.005
     assert max(off) > 0.02
+
+
+@pytest.mark.parametrize("fov_deg", [360.0, 180.0])
+def test_late_scans_with_broken_beams_stop_nobody(fov_deg):
+    """Single holes are bridged before a scan is moved on; they became walls from the body outwards."""
+    values = {"task": {"name": "T1"}, "robots": 3, "seed": 2, "limit_s": 90.0, "record_scans": "no"}
+    values |= {"lidar": {"fov_deg": fov_deg}, "noise": {"scan_age_s": 0.15, "nan": 0.02}}
+    scenario = parse_scenario(values, "test")
+    robots = run(make_setting(scenario, make_setup(scenario))).robots
+    assert robots["arrived"].all()
+    assert not robots["crashed"].any()

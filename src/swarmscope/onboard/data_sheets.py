@@ -85,6 +85,11 @@ def check_rate(rate_hz: Any) -> float:
     return value
 
 
+def core_of(body: Body, options: Mapping[str, Any]) -> float:
+    """Return the radius of the body and the clearance round it [m]."""
+    return float(body.radius_m + _part(Guarding, options).clearance_m)
+
+
 def rig_of(body: Body, lidar: Lidar, scans: Scans, options: Mapping[str, Any]) -> Rig:
     """Return the robot's constants; raises ConfigError when LiDAR and body do not go together."""
     offset = math.hypot(lidar.mount[0], lidar.mount[1])
@@ -105,6 +110,8 @@ def _part(kind: Any, options: Mapping[str, Any]) -> Any:
     return kind(**{name: options[name] for name in kind._fields})
 
 
+LEAST_VIEW_DEG = 30.0
+"""What stands beside a robot has been ahead of it before; with a narrower view than this many do not get on."""
 SLOWEST_MPS = 0.1
 """A robot that may not be as fast as this, for what it sees, can hardly move."""
 
@@ -120,6 +127,10 @@ def check_horizon(rig: Rig, dt_s: float) -> None:
         raise ConfigError(
             "guard.strangers_mps", "somebody may come from where this LiDAR does not look: lidar.fov_deg 360 would do"
         )
+    view = math.degrees(rig.sensor.increment * (rig.sensor.field - 1))
+    if rig.sensor.field > 0 and view < LEAST_VIEW_DEG - 1e-6:
+        why = f"a view of {view:.0f} degrees shows too little of what is beside the way"
+        raise ConfigError("lidar.fov_deg", f"{why}; {LEAST_VIEW_DEG:g} would do, seen from the body's centre")
     speed = min(SLOWEST_MPS, rig.body.v_max_mps)
     delay, brake = dt_s + guarding.latency_s, speed * speed / (2.0 * rig.body.a_max_mps2)
     _check_view(rig, speed, taken + speed * delay + brake, "things", guarding.thinnest_m, 0.0)

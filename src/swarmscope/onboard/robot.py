@@ -22,6 +22,7 @@ from swarmscope.onboard.data_sheets import (
     check_boot,
     check_horizon,
     check_rate,
+    core_of,
     options_of,
     planner_of,
     rig_of,
@@ -180,7 +181,7 @@ class Robot:
 
     def _set_up(self) -> tuple[Scans, Rows]:
         """Return fresh scans and rows."""
-        scans = Scans(self.lidar, self._period_s)
+        scans = Scans(self.lidar, self._period_s, core_of(self.body, self._options))
         rig = rig_of(self.body, self.lidar, scans, self._options)
         check_horizon(rig, self._period_s)
         scans.build_in(rig)

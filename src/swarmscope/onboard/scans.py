@@ -17,7 +17,7 @@ from swarmscope.onboard.lidar import Layout, Lidar, grid_of, lay_out, layout_of,
 from swarmscope.onboard.perception.reproject import NEAR_M, NEAR_STEPS, Grid, settle
 from swarmscope.onboard.readings import must_be_millimetres, own_rays, translate
 from swarmscope.onboard.rig import Rig
-from swarmscope.onboard.sweep import Taken, from_many_places, from_one_place
+from swarmscope.onboard.sweep import Taken, from_many_places, from_one_place, seen_from_the_centre
 from swarmscope.onboard.trail import Trail
 
 MOST_READINGS = 8192
@@ -51,13 +51,17 @@ class _Told(NamedTuple):
 class Scans:
     """A LiDAR's scans as one robot uses them."""
 
-    def __init__(self, lidar: Lidar, period_s: float) -> None:
+    def __init__(self, lidar: Lidar, period_s: float, core: float) -> None:
+        """``core`` [m]: the radius of what is the robot itself, its clearance included."""
         self._lidar, self._period_s = lidar, period_s
         if sweep_s(lidar) > LONGEST_PERIODS * period_s:
             takes, used = f"{sweep_s(lidar):.3g}", f"{LONGEST_PERIODS * period_s:.3g}"
             raise ConfigError("lidar.time_increment_s", f"a scan takes {takes} s; at this rate_hz it may take {used} s")
         self._sheet = layout_of(lidar)
+        self._centred = lidar.mount[:2] == (0.0, 0.0)
         self.grid = grid_of(self._sheet)
+        if not (self._centred or self.grid.rays.closed):
+            self.grid = seen_from_the_centre(self.grid, lidar.mount, core)
         angles = self.grid.rays.start + self.grid.rays.increment * np.arange(self.grid.order.size)
         self._wanted = Grid(self.grid.rays, np.cos(angles), np.sin(angles))
         self._header: tuple[float, ...] = ()
@@ -66,7 +70,6 @@ class Scans:
         )
         self._raw = np.empty(lidar.beams, np.float32)
         self._scan = np.empty(self._sheet.order.size, np.float32)
-        self._centred = lidar.mount[:2] == (0.0, 0.0)
         self._rig: Rig
         self.forget()
 

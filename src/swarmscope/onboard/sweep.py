@@ -11,9 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from swarmscope.errors import ConfigError
 from swarmscope.geometry import TWO_PI, Pose
 from swarmscope.onboard.lidar import Layout
-from swarmscope.onboard.perception.mend import body_and_clearance, mend
+from swarmscope.onboard.perception.mend import BRIDGED, body_and_clearance, bridge, mend
 from swarmscope.onboard.perception.reproject import Grid, Seat, reproject
 from swarmscope.onboard.perception.straighten import straighten
 from swarmscope.onboard.rig import Rig
@@ -21,8 +22,6 @@ from swarmscope.onboard.sensor import Sensor
 from swarmscope.onboard.trail import then
 
 Mount = tuple[float, float, float]
-BRIDGED = 1.001
-"""A hole that is filled farther away than so many times what touches the body is one that was bridged."""
 
 
 class Taken(NamedTuple):
@@ -61,6 +60,25 @@ def from_many_places(taken: Taken, back: np.ndarray, rig: Rig, wanted: Grid) -> 
     return out
 
 
+def seen_from_the_centre(layout: Layout, mount: Mount, core: float) -> Layout:
+    """Return which rays of a limited field the body's centre would see, its body of radius ``core`` [m] aside.
+
+    A sensor off the centre leaves out what only it can see. Raises ConfigError where straight ahead is not left.
+    """
+    rays = layout.rays
+    angles = rays.start + rays.increment * np.arange(layout.order.size)
+    out, open_scan = np.empty(angles.size, np.float32), np.full(angles.size, np.inf, np.float32)
+    reproject(
+        open_scan, rays, Seat(*mount[:2], 0.0, 0.0, 0.0, core), Grid(rays, np.cos(angles), np.sin(angles)), out
+    )
+    seen = np.flatnonzero(~np.isnan(out))
+    first, last = (int(seen[0]), int(seen[-1])) if seen.size else (0, 0)
+    if not (angles[first] <= 1e-9 and angles[last] >= -1e-9 and last > first):
+        raise ConfigError("lidar.mount", "the body's centre would not see straight ahead: mount it nearer the centre")
+    start = rays._replace(start=rays.start + first * rays.increment)
+    return Layout(start, np.ascontiguousarray(layout.order[first : last + 1]))
+
+
 def _blind_m(taken: Taken) -> float:
     """Return how far from the body's centre something may be that is too near to be measured [m]."""
     return taken.least_m + math.hypot(taken.mount[0], taken.mount[1])
@@ -71,16 +89,23 @@ def bridged(scan: np.ndarray, layout: Layout, rig: Rig, blind_m: float) -> np.nd
     holes = np.isnan(scan)
     if not holes.any():
         return scan
-    whole = mended(scan, layout, rig, blind_m)
-    return np.where(holes & is_bridged(whole, rig), whole, scan)
+    whole = scan.copy()
+    bridge(whole, _along(layout, scan.size, rig, blind_m), np.empty(scan.size, np.uint8))
+    return np.where(holes, whole, scan)
 
 
 def mended(scan: np.ndarray, layout: Layout, rig: Rig, blind_m: float) -> np.ndarray:
     """Return ``scan (M,)`` along the rays of ``layout`` as ``mend`` leaves it."""
+    whole = scan.copy()
+    mend(whole, _along(layout, scan.size, rig, blind_m), np.empty(scan.size, np.uint8))
+    return whole
+
+
+def _along(layout: Layout, count: int, rig: Rig, blind_m: float) -> Rig:
+    """Return the robot's constants with a sensor whose ``count`` beams are the rays of ``layout``."""
     rays, sensor = layout.rays, rig.sensor
-    whole, broken = scan.copy(), np.empty(scan.size, np.uint8)
     told = Sensor(
-        beams=scan.size,
+        beams=count,
         angle_min=rays.start,
         increment=rays.increment,
         wraps=rays.closed,
@@ -89,8 +114,7 @@ def mended(scan: np.ndarray, layout: Layout, rig: Rig, blind_m: float) -> np.nda
         range_sigma=sensor.range_sigma,
         position_sigma=sensor.position_sigma,
     )
-    mend(whole, rig._replace(sensor=told), broken)
-    return whole
+    return rig._replace(sensor=told)
 
 
 def is_bridged(whole: np.ndarray, rig: Rig) -> np.ndarray:

@@ -104,9 +104,23 @@ def test_what_a_limited_field_does_not_cover_is_broken():
     out = moved(scan, Seat(-0.3, 0.0, 0.0, -0.3, 0.0, CORE), rays, rays, 181)
     assert np.isinf(out).all()
     out = moved(scan, Seat(-0.3, 0.0, -0.5, -0.3, 0.0, CORE), rays, rays, 181)  # we have turned to the left
-    assert (np.diff(out[-26:]) < 0.0).all()
-    assert out[-1] < 0.6
+    assert np.isnan(out[-26:]).all()
     assert np.isinf(out[:120]).all()
+
+
+@pytest.mark.parametrize("thing", [(1.0, 0.6, 0.2), (0.15, 1.0, 0.1), (0.6, -1.5, 0.4), (0.5, 2.9, 0.05)])
+def test_what_only_a_sensor_before_us_sees_leaves_no_holes(thing):
+    """The line beside the sensor is crossed before anything that it has seen: nobody has looked that far."""
+    beams = make_beams(181, math.pi, 5.0)
+    rays, before = Rays(beams.angle_min, beams.increment, False, 5.0), 0.1
+    scan = np.full(181, np.inf, np.float32)
+    cast_static(circles_world([thing]), before, 0.0, 0.0, beams, scan)
+    out = moved(scan, Seat(before, 0.0, 0.0, 0.0, 0.0, CORE), rays, rays, 181)
+    seen = np.flatnonzero(~np.isnan(out))
+    edge = math.degrees(math.acos(before / CORE))
+    assert (np.diff(seen) == 1).all()
+    assert seen[0] == 90 - math.floor(edge)
+    assert seen[-1] == 90 + math.floor(edge)
 
 
 def test_twice_the_beams_into_a_scan():

@@ -6,13 +6,16 @@ import math
 
 import numpy as np
 
-from swarmscope._jit import jit_inline, jit_inner
+from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.onboard.rig import Rig
 
 NEAR_BODIES = 4.0
 """Within so many times what touches the body centimetres count."""
 BESIDE = 1e-6
 """A blocked beam ends this far outside of what the guard keeps free [m]."""
+
+BRIDGED = 1.001
+"""A hole that is filled farther away than so many times what touches the body is one that was bridged."""
 
 
 @jit_inline
@@ -45,6 +48,17 @@ def mend(ranges: np.ndarray, rig: Rig, broken: np.ndarray) -> int:
     if count > 0:
         _bridge(ranges, rig, least)
     return count
+
+
+@jit
+def bridge(ranges: np.ndarray, rig: Rig, broken: np.ndarray) -> None:
+    """Replace broken readings as ``mend`` does where no body fits into the hole; where it blocks they become NaN."""
+    if mend(ranges, rig, broken) == 0:
+        return
+    blocks = np.float32(BRIDGED * body_and_clearance(rig))
+    for n in range(ranges.size):
+        if broken[n] and not ranges[n] > blocks:
+            ranges[n] = np.nan
 
 
 @jit_inner

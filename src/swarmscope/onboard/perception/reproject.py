@@ -2,7 +2,8 @@
 
 What a scan knows is the area between the sensor and its readings. Its border is what a robot elsewhere sees: the
 returns, joined ray by ray (between a near and a far one lies the edge of a shadow, and nobody knows what is in it), and
-walls along broken rays and along the edges of a limited field. Directions in which no border is seen are broken (NaN).
+walls along broken rays. Directions in which no border is seen are broken (NaN), and so are those that cross the edge of
+a limited field before one: nobody has looked there.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 
 from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.geometry import ray_segment, wrap_angle
+from swarmscope.onboard.perception.mend import bridge
 from swarmscope.onboard.perception.rays import Rays
 from swarmscope.onboard.view import View
 
@@ -59,7 +61,10 @@ class End(NamedTuple):
 
 @jit_inline
 def move_on(see: View) -> None:
-    """Make ``see.scan`` of a moment before what is seen from where the robot is now; ``see.filtered`` is scratch."""
+    """Make ``see.scan`` of a moment before what is seen from where the robot is now.
+
+    ``see.filtered`` and ``see.safe`` are scratch.
+    """
     percept = see.percept
     far = math.hypot(percept["scan_x"], percept["scan_y"]) > NEAR_M
     if far or abs(percept["scan_yaw"]) > NEAR_STEPS * see.rig.sensor.increment:
@@ -74,6 +79,7 @@ def _see_from_here(see: View) -> None:
     for n in range(sensor.beams):  # out of a limited view nothing was measured
         measured = sensor.field == 0 or sensor.first <= n < sensor.first + sensor.field
         see.filtered[n] = see.scan[n] if measured else math.inf
+    bridge(see.filtered, see.rig, see.safe)
     rays = Rays(sensor.angle_min, sensor.increment, sensor.wraps, sensor.range_max)
     seat = Seat(x, y, yaw, x, y, see.rig.body.radius_m + see.rig.guarding.clearance_m)
     reproject(see.filtered, rays, seat, Grid(rays, see.rig.cos, see.rig.sin), see.scan)
@@ -117,16 +123,19 @@ def reproject(scan: np.ndarray, rays: Rays, seat: Seat, grid: Grid, out: np.ndar
         before = end
     if rays.closed:
         _join(scan[total - 1], scan[0], before, first, grid, out)
+        return
+    first_angle = rays.start + seat.yaw
+    _leave_out(True, first_angle, seat, grid, out)
+    _leave_out(False, first_angle + (total - 1) * rays.increment, seat, grid, out)
 
 
 @jit_inner
 def _beside_unknown(scan: np.ndarray, k: int, closed: bool) -> bool:
-    """Tell whether ray k is an edge of what nobody has seen: of a run of broken rays, or of the field."""
+    """Tell whether ray k is the edge of a run of broken rays."""
     total = scan.size
-    if not closed and k in (0, total - 1):
-        return True
     before, after = scan[k - 1 if k > 0 else total - 1], scan[k + 1 if k + 1 < total else 0]
-    return not scan[k] >= 0.0 and (before >= 0.0 or after >= 0.0)
+    before_is_sound, after_is_sound = before >= 0.0 and (closed or k > 0), after >= 0.0 and (closed or k + 1 < total)
+    return not scan[k] >= 0.0 and (before_is_sound or after_is_sound)
 
 
 @jit_inner
@@ -148,14 +157,37 @@ def _join(range_a: float, range_b: float, a: End, b: End, grid: Grid, out: np.nd
 @jit_inner
 def _wall(angle: float, reach: float, seat: Seat, grid: Grid, out: np.ndarray) -> None:
     """Draw the ray at ``angle`` from where it leaves the robot, then and now, to its end."""
+    a, b = _outside(angle, reach, seat)
+    _draw(a, b, True, grid, out)
+    _dot(a, grid, out)
+
+
+@jit_inner
+def _leave_out(right: bool, angle: float, seat: Seat, grid: Grid, out: np.ndarray) -> None:
+    """Make directions unknown that cross the ray at ``angle``, an edge of the field, before they meet a border.
+
+    With them goes whatever lies farther out on that side: what is left is a field without holes.
+    """
+    a, b = _outside(angle, grid.rays.reach, seat)
+    low, high = _between(a, b, grid, out.size)
+    inner = -1 if right else out.size
+    for n in range(max(low, 0), min(high, out.size - 1) + 1):
+        s = ray_segment(grid.cos[n], grid.sin[n], a.x, a.y, b.x, b.y)
+        if s < np.inf and not out[n] <= s:
+            inner = max(inner, n) if right else min(inner, n)
+    for n in range(inner + 1 if right else out.size - inner):
+        out[n if right else inner + n] = np.nan
+
+
+@jit_inner
+def _outside(angle: float, reach: float, seat: Seat) -> tuple[End, End]:
+    """Return where the ray at ``angle`` leaves the robot, then and now, and where it ends."""
     dx, dy = math.cos(angle), math.sin(angle)
     begin = max(_leaves(dx, dy, -seat.x, -seat.y, seat.core), 0.0)
     begin = max(begin, _leaves(dx, dy, seat.body_x - seat.x, seat.body_y - seat.y, seat.core))
     ax, ay = seat.x + begin * dx, seat.y + begin * dy
     bx, by = seat.x + reach * dx, seat.y + reach * dy
-    a = End(ax, ay, math.atan2(ay, ax))
-    _draw(a, End(bx, by, math.atan2(by, bx)), True, grid, out)
-    _dot(a, grid, out)
+    return End(ax, ay, math.atan2(ay, ax)), End(bx, by, math.atan2(by, bx))
 
 
 @jit_inner
@@ -179,15 +211,22 @@ def _dot(a: End, grid: Grid, out: np.ndarray) -> None:
 @jit_inner
 def _draw(a: End, b: End, solid: bool, grid: Grid, out: np.ndarray) -> None:
     """Lower every ray that meets a-b; one that is not ``solid`` only shows that nothing was seen there."""
-    width = wrap_angle(b.bearing - a.bearing)
-    low, high = 0.0, out.size - 1.0
-    if abs(width) <= ON_BORDER:
-        low = _offset(a.bearing if width >= 0.0 else b.bearing, grid)
-        high = low + abs(width) / grid.rays.increment
-    for k in range(int(math.ceil(low - 1e-6)), int(math.floor(high + 1e-6)) + 1):
+    low, high = _between(a, b, grid, out.size)
+    for k in range(low, high + 1):
         n = k % out.size if grid.rays.closed else k
         if 0 <= n < out.size:
             _lower(out, n, _meet(a, b, n, grid) if solid else np.inf)
+
+
+@jit_inner
+def _between(a: End, b: End, grid: Grid, total: int) -> tuple[int, int]:
+    """Return the first and the last ray between a and b, counted on round a circle; all where a-b passes through us."""
+    width = wrap_angle(b.bearing - a.bearing)
+    low, high = 0.0, total - 1.0
+    if abs(width) <= ON_BORDER:
+        low = _offset(a.bearing if width >= 0.0 else b.bearing, grid)
+        high = low + abs(width) / grid.rays.increment
+    return int(math.ceil(low - 1e-6)), int(math.floor(high + 1e-6))
 
 
 @jit_inner

@@ -18,6 +18,7 @@ from swarmscope.onboard.perception.reproject import (  # the same border, drawn 
     _dot,
     _end,
     _join,
+    _leave_out,
     _wall,
 )
 
@@ -42,23 +43,21 @@ def straighten(scan: np.ndarray, rays: Rays, seats: np.ndarray, core: float, gri
         if (k > 0 or rays.closed) and _is_next(seats, k, rays):
             _join(scan[k - 1 if k > 0 else total - 1], scan[k], before, end, grid, out)
         if _beside_unknown(scan, k, rays.closed):
-            beside = 0 if rays.closed or not scan[k] >= 0.0 else _beyond(k, total)
-            _wall(rays.start + seat.yaw + (k + beside) * rays.increment, rays.reach, seat, grid, out)
+            _wall(rays.start + seat.yaw + k * rays.increment, rays.reach, seat, grid, out)
         if scan[k] < np.inf and not _is_in_line(scan, k, rays, seats, core):
             _dot(end, grid, out)
         before = end
+    if rays.closed:
+        return
+    right, left = _seat(seats, 0, core), _seat(seats, total - 1, core)  # the outermost rays themselves were free
+    _leave_out(True, rays.start + right.yaw - rays.increment, right, grid, out)
+    _leave_out(False, rays.start + left.yaw + total * rays.increment, left, grid, out)
 
 
 @jit_inner
 def _seat(seats: np.ndarray, k: int, core: float) -> Seat:
     """Return where ray k was taken."""
     return Seat(seats[k, 0], seats[k, 1], seats[k, 2], seats[k, 3], seats[k, 4], core)
-
-
-@jit_inner
-def _beyond(k: int, total: int) -> int:
-    """Return by how many increments the edge of a field lies beside its outermost rays: they themselves were free."""
-    return -1 if k == 0 else 1 if k == total - 1 else 0
 
 
 @jit_inner
