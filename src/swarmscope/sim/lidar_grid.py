@@ -29,7 +29,7 @@ Indices = npt.NDArray[np.int32]
 
 SLACK = 4.0 * ROUGH
 """Beams nearer than this to a corner [rad] are compared with it exactly."""
-FEW_BEAMS = 16
+FEW_BEAMS = 48
 """So few are walked faster one by one."""
 
 
@@ -78,7 +78,7 @@ class _Frame(NamedTuple):
     right_edge: int
 
 
-@jit
+@jit_inline
 def cast_grid(world: World, x: float, y: float, cos_yaw: float, sin_yaw: float, beams: Beams, out: Ranges) -> None:
     """Fill ``out`` (M,) with the ranges [m] to the solid cells from x, y [m], heading cos, sin, world frame."""
     sensor = _sensor_in(world, x, y, cos_yaw, sin_yaw, beams)
@@ -135,7 +135,7 @@ def _half_turn_end(sensor: _Sensor, beams: Beams, first: int, angle: float, up: 
 
     It is ``angle`` [rad] from beam 0, to within rounding.
     """
-    total = beams.cos.shape[0]
+    total = int(beams.cos.shape[0])
     n = max(first, min(int((angle - SLACK) * sensor.per_rad + 1.0), total))
     while n < total and (sensor.sin * beams.cos[n] + sensor.cos * beams.sin[n] >= 0.0) == up:
         n += 1
@@ -263,7 +263,7 @@ def _beam_past(
     return n
 
 
-@jit
+@jit_inline
 def _cast_wall(
     wall: float, cos: float, sin: float, sensor: _Sensor, beams: Beams, first: int, stop: int, out: Ranges
 ) -> None:
@@ -271,8 +271,16 @@ def _cast_wall(
 
     ``cos`` and ``sin`` are those of the sensor's heading from that axis.
     """
+    if first < stop:  # more often there are none: a call would take longer than the rest
+        _meet_line(wall, cos, sin, sensor, beams, first, stop, out)
+
+
+@jit
+def _meet_line(
+    wall: float, cos: float, sin: float, sensor: _Sensor, beams: Beams, first: int, stop: int, out: Ranges
+) -> None:
     cosines, sines, reach, side = beams.cos, beams.sin, sensor.reach, sensor.side
-    for n in range(np.uint64(first), np.uint64(stop)):  # no negative numbers: the compiler can cast several at once
+    for n in range(np.uint64(first), np.uint64(stop)):  # no negative numbers: the compiler casts several at once
         t = wall * (1.0 / (cos * cosines[n] - sin * sines[n]))
         out[n] = side * t if t <= reach else math.inf
 

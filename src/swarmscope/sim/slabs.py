@@ -33,7 +33,7 @@ class Slabs(NamedTuple):
     run_slab: Indices
     """(R,) to which slab each free run belongs; from left to right, row by row."""
     table: Indices
-    """(S, 8) left, bottom, right, top [cells]; from where to where in ``links`` are the slabs above, and those below."""
+    """(S, 8) left, bottom, right, top [cells]; where in ``links`` those above begin and end, and those below."""
     links: Indices
     """(L,) the slabs above each one from right to left, and those below from left to right: counter-clockwise."""
 
@@ -44,13 +44,12 @@ def free_slabs(solid: Bytes) -> Slabs:
     rows, first = np.nonzero(edges == 1)
     if len(first) > MOST_SLABS:
         return free_slabs(solid[:0])
-    stop = np.nonzero(edges == -1)[1].astype(np.int32)
-    first = first.astype(np.int32)
     row_start = np.searchsorted(rows, np.arange(len(solid) + 1)).astype(np.int32)
-    run_slab, table = np.zeros(len(first), np.int32), np.zeros((len(first), 8), np.int32)
-    count = _join_runs(row_start, first, stop, run_slab, table)
-    links = np.zeros(4 * len(first), np.int32)  # between two rows there are fewer portals than free runs in both
-    used = _link_slabs(row_start, first, stop, run_slab, table, links)
+    runs = np.column_stack([first, np.nonzero(edges == -1)[1]]).astype(np.int32)
+    run_slab, table = np.zeros(len(runs), np.int32), np.zeros((len(runs), 8), np.int32)
+    count = _join_runs(row_start, runs, run_slab, table)
+    links = np.zeros(4 * len(runs), np.int32)  # between two rows there are fewer portals than free runs in both
+    used = _link_slabs(row_start, runs, run_slab, table, links)
     return Slabs(row_start, run_slab, table[:count].copy(), links[:used].copy())
 
 
@@ -64,32 +63,33 @@ def slab_at(slabs: Slabs, row: int, col: int) -> int:
             low = middle
         else:
             high = middle
-    return slabs.run_slab[low]
+    return int(slabs.run_slab[low])
 
 
 @jit
-def _join_runs(row_start: Indices, first: Indices, stop: Indices, run_slab: Indices, table: Indices) -> int:
-    """Fill ``run_slab`` and the borders in ``table``; return how many slabs there are."""
+def _join_runs(row_start: Indices, runs: Indices, run_slab: Indices, table: Indices) -> int:
+    """Fill ``run_slab`` and the borders in ``table``; return how many slabs there are.
+
+    ``runs`` (R, 2) are first column and end of the free runs.
+    """
     count = 0
     for row in range(row_start.shape[0] - 1):
         below = row_start[max(row - 1, 0)]
         for run in range(row_start[row], row_start[row + 1]):
-            while below < row_start[row] and first[below] < first[run]:
+            while below < row_start[row] and runs[below, 0] < runs[run, 0]:
                 below += 1
-            if below < row_start[row] and first[below] == first[run] and stop[below] == stop[run]:
+            if below < row_start[row] and runs[below, 0] == runs[run, 0] and runs[below, 1] == runs[run, 1]:
                 run_slab[run] = run_slab[below]
             else:
                 run_slab[run] = count
-                table[count, LEFT], table[count, BOTTOM], table[count, RIGHT] = first[run], row, stop[run]
+                table[count, LEFT], table[count, BOTTOM], table[count, RIGHT] = runs[run, 0], row, runs[run, 1]
                 count += 1
             table[run_slab[run], TOP] = row + 1
     return count
 
 
 @jit
-def _link_slabs(
-    row_start: Indices, first: Indices, stop: Indices, run_slab: Indices, table: Indices, links: Indices
-) -> int:
+def _link_slabs(row_start: Indices, runs: Indices, run_slab: Indices, table: Indices, links: Indices) -> int:
     """Fill ``links`` and where those of each slab are in ``table``; return how many there are."""
     used = 0
     for row in range(1, row_start.shape[0] - 1):
@@ -97,12 +97,12 @@ def _link_slabs(
         other = high - 1
         for run in range(middle - 1, low - 1, -1):
             slab = run_slab[run]
-            while other >= middle and first[other] >= stop[run]:
+            while other >= middle and runs[other, 0] >= runs[run, 1]:
                 other -= 1
             if table[slab, TOP] == row:
                 table[slab, ABOVE] = used
                 above = other
-                while above >= middle and stop[above] > first[run]:
+                while above >= middle and runs[above, 1] > runs[run, 0]:
                     links[used] = run_slab[above]
                     used += 1
                     above -= 1
@@ -110,12 +110,12 @@ def _link_slabs(
         other = low
         for run in range(middle, high):
             slab = run_slab[run]
-            while other < middle and stop[other] <= first[run]:
+            while other < middle and runs[other, 1] <= runs[run, 0]:
                 other += 1
             if table[slab, BOTTOM] == row:
                 table[slab, BELOW] = used
                 below = other
-                while below < middle and first[below] < stop[run]:
+                while below < middle and runs[below, 0] < runs[run, 1]:
                     links[used] = run_slab[below]
                     used += 1
                     below += 1
