@@ -89,7 +89,8 @@ def test_equals_the_walk_bit_for_bit(seed, density, fov):
         shape = tuple(rng.integers(1, 40, 2))
         side, yaw = rng.choice([0.02, 0.05, 0.1, 0.3, 1.0]), rng.choice([0.0, rng.uniform(-9, 9)])
         world = world_of(random_solid(rng, shape, density), side, rng.uniform(-5, 5, 2), yaw)
-        beams = make_beams(int(rng.choice([8, FEW_BEAMS, 60, 361, 1440])), fov, side * rng.choice([3.0, 20.0, 200.0]))
+        count, reach = rng.choice([8, FEW_BEAMS, 60, 361, 1440]), rng.choice([rng.uniform(1, 40), 200.0])
+        beams = make_beams(int(count), fov, side * reach)
         c, s = math.cos(yaw), math.sin(yaw)
         for _ in range(8):  # in solid cells and outside, too
             u, v = side * rng.uniform(-0.2, 1.2, 2) * shape[::-1]
@@ -126,6 +127,17 @@ def test_no_beam_leaves_a_closed_room(seed):
         place = rng.choice([rng.uniform(-2.4, 2.4, 2), 0.25 * rng.integers(-9, 10, 2)])
         pose = (*place, rng.choice([rng.uniform(-4, 4), math.pi / 4 * rng.integers(-4, 5)]))
         assert np.all(np.isfinite(scan(world, pose, beams)))
+
+
+@pytest.mark.parametrize("reach", [38.4, 38.6, 39.4, 39.5, 39.6])
+def test_what_is_just_within_the_range_is_seen(reach):
+    """At the end of a corridor, 39.5 cells off, behind the last portal at 38.5 cells."""
+    solid = np.zeros((41, 9), dtype=bool)
+    solid[40] = solid[39, 7:] = solid[:, 8] = True
+    world, beams = world_of(solid), make_beams(361, math.radians(20), reach)
+    found = scan(world, (4.5, 0.5, math.pi / 2), beams)
+    assert same_bits(found, walked_scan(world, (4.5, 0.5, math.pi / 2), beams))
+    assert found[180] == (39.5 if reach >= 39.5 else math.inf)
 
 
 def test_grids_with_too_many_slabs_are_walked(monkeypatch):
