@@ -8,51 +8,22 @@ the choice of beams is rounded outwards. The sensor sits at the robot's centre a
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from swarmscope._jit import jit, jit_inline
-from swarmscope.errors import ConfigError
 from swarmscope.geometry import rough_angle
-from swarmscope.sim.world import PIECE_M, World, bin_index, bin_run, in_grid
+from swarmscope.sim.beams import Beams, Ranges, make_beams
+from swarmscope.sim.lidar_grid import cast_grid
+from swarmscope.sim.world import PIECE_M, World, bin_index, bin_run
+
+__all__ = ["ANGLE_SLACK", "Beams", "Bytes", "Ranges", "cast_disc", "cast_segment", "cast_static", "make_beams"]
 
 Bytes = npt.NDArray[np.uint8]
-Ranges = npt.NDArray[np.float32]
 
 ANGLE_SLACK = 5e-4
 """Added to each side of an obstacle's angular interval [rad]; larger than the error of `rough_angle`."""
-
-
-class Beams(NamedTuple):
-    """The beams of a lidar; beam n looks at ``angle_min + n * increment`` [rad], sensor frame, CCW."""
-
-    cos: npt.NDArray[np.float64]
-    """(M,)"""
-    sin: npt.NDArray[np.float64]
-    """(M,)"""
-    angle_min: float
-    increment: float
-    wraps: bool
-    """True for a full circle: the beam after the last is the first."""
-    range_max: float
-    """Longest range [m]."""
-
-
-def make_beams(beams: int, fov_rad: float, range_max_m: float) -> Beams:
-    """Return ``beams`` directions over ``fov_rad``: a full circle from -pi, or a field with its edges."""
-    if beams < 2:
-        raise ConfigError("lidar.beams", f"must be at least 2, got {beams}")
-    if not 0.0 < fov_rad <= 2.0 * math.pi + 1e-9:
-        raise ConfigError("lidar.fov_rad", f"must be above 0 and at most 2 pi, got {fov_rad}")
-    if not 0.0 < range_max_m < math.inf:
-        raise ConfigError("lidar.range_max_m", f"must be above 0 and finite, got {range_max_m}")
-    wraps = fov_rad >= 2.0 * math.pi - 1e-9
-    angle_min = -math.pi if wraps else -0.5 * float(fov_rad)
-    increment = 2.0 * math.pi / beams if wraps else float(fov_rad) / (beams - 1)
-    angles = angle_min + np.arange(beams) * increment
-    return Beams(np.cos(angles), np.sin(angles), angle_min, increment, wraps, float(range_max_m))
 
 
 @jit_inline
@@ -62,15 +33,16 @@ def cast_static(world: World, x: float, y: float, yaw: float, beams: Beams, out:
     ``inf`` where nothing is within ``range_max``. From inside a circle or polygon the range is to its far
     surface; from inside a solid grid cell it is 0. In a wall, where no robot can be, it is to whatever lies beyond.
     """
-    for n in range(out.shape[0]):
-        out[n] = math.inf
     cos_yaw, sin_yaw = math.cos(yaw), math.sin(yaw)
+    if world.solid.shape[0] > 0:
+        cast_grid(world, x, y, cos_yaw, sin_yaw, beams, out)
+    else:
+        for n in range(out.shape[0]):
+            out[n] = math.inf
     if world.circles.shape[0] > 0:
         _cast_circles(world, x, y, cos_yaw, sin_yaw, beams, out)
     if world.segments.shape[0] > 0:
         _cast_segments(world, x, y, cos_yaw, sin_yaw, beams, out)
-    if world.solid.shape[0] > 0:
-        _cast_grid(world, x, y, cos_yaw, sin_yaw, beams, out)
 
 
 @jit_inline
@@ -201,70 +173,3 @@ def _cast_segments(
                 continue
             if 0.25 * ((ax + bx) * (ax + bx) + (ay + by) * (ay + by)) <= reach * reach:
                 cast_segment(ax, ay, bx, by, beams, out)
-
-
-@jit
-def _cast_grid(
-    world: World, x: float, y: float, cos_yaw: float, sin_yaw: float, beams: Beams, out: Ranges
-) -> None:
-    """Walk every beam through the occupancy grid."""
-    resolution = world.solid_resolution
-    px, py = in_grid(world, x, y)
-    px, py = px / resolution, py / resolution
-    c, s = world.solid_turn[0], world.solid_turn[1]
-    cos_yaw, sin_yaw = c * cos_yaw + s * sin_yaw, c * sin_yaw - s * cos_yaw
-    for n in range(out.shape[0]):
-        dx = cos_yaw * beams.cos[n] - sin_yaw * beams.sin[n]
-        dy = sin_yaw * beams.cos[n] + cos_yaw * beams.sin[n]
-        distance = resolution * _grid_ray(world.solid_gap, px, py, dx, dy, beams.range_max / resolution)
-        if distance <= beams.range_max and distance < out[n]:
-            out[n] = distance
-
-
-@jit
-def _grid_ray(gap: Bytes, px: float, py: float, dx: float, dy: float, far: float) -> float:
-    """Return how far a ray from p along unit direction d goes to a solid cell's border [cells], else inf.
-
-    Amanatides and Woo's walk from border to border, except that where ``gap`` says that the nearest solid
-    cell is k cells away, the ray crosses the whole free square of 2 k - 1 cells at once.
-    """
-    rows, columns = gap.shape
-    inverse_x = 1.0 / dx if dx != 0.0 else math.inf
-    inverse_y = 1.0 / dy if dy != 0.0 else math.inf
-    t, end = _clip_to_grid(px, dx, inverse_x, columns, 0.0, far)
-    t, end = _clip_to_grid(py, dy, inverse_y, rows, t, end)
-    col, row = bin_index(px + t * dx, 0.0, 1.0, columns), bin_index(py + t * dy, 0.0, 1.0, rows)
-    while t <= end and 0 <= col < columns and 0 <= row < rows:
-        k = int(gap[row, col])
-        if k == 0:
-            return t
-        border_x, border_y = (col + k if dx >= 0.0 else col - k + 1), (row + k if dy >= 0.0 else row - k + 1)
-        t_x, t_y = (border_x - px) * inverse_x, (border_y - py) * inverse_y
-        if t_x <= t_y:
-            t = t_x
-            col = border_x if dx >= 0.0 else border_x - 1
-            row = _cell_after(py + t * dy, row, k, dy)
-        else:
-            t = t_y
-            row = border_y if dy >= 0.0 else border_y - 1
-            col = _cell_after(px + t * dx, col, k, dx)
-    return math.inf
-
-
-@jit_inline
-def _clip_to_grid(
-    p: float, d: float, inverse: float, count: int, t: float, end: float
-) -> tuple[float, float]:
-    """Return the part of a ray's stretch t .. end between borders 0 and ``count`` of one axis."""
-    if d == 0.0:
-        return (t, end) if 0.0 <= p < count else (math.inf, end)
-    enter, leave = -p * inverse, (count - p) * inverse
-    return max(t, min(enter, leave)), min(end, max(enter, leave))
-
-
-@jit_inline
-def _cell_after(position: float, cell: int, k: int, d: float) -> int:
-    """Return the cell of ``position`` along one axis, in the free square and never against direction d."""
-    if d >= 0.0:
-        return cell + int(min(max(position - cell, 0.0), k - 1.0))
-    return cell - int(min(max(math.ceil(cell - position), 0.0), k - 1.0))

@@ -19,6 +19,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_valida
 
 from swarmscope._jit import jit, jit_inline
 from swarmscope.errors import ConfigError
+from swarmscope.sim.slabs import Slabs, free_slabs
 
 PIECE_M = 1.0
 """Walls and polygon edges are cut into pieces no longer than this [m]: a look-up finds them by midpoint."""
@@ -258,6 +259,8 @@ class World(NamedTuple):
     """(2,) direction in which the columns count: cos, sin."""
     solid_resolution: float
     """Side of a cell [m]."""
+    slabs: Slabs
+    """The free cells as rectangles, which a lidar's beams cross."""
 
 
 _LATEST: list[tuple[tuple[Any, ...], World]] = []
@@ -313,6 +316,7 @@ def _compiled(spec: WorldSpec) -> World:
         solid_origin=origin,
         solid_turn=turn,
         solid_resolution=resolution,
+        slabs=free_slabs(solid),
     )
 
 
