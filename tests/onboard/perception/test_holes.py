@@ -46,6 +46,13 @@ def test_beside_broken_beams_all_round_nothing_shows():
     assert shows_beside(359, rig_of()) == 0.0
 
 
+def test_where_nothing_is_narrow_nothing_stands_in_a_hole():
+    rows = one_robot(rig=rig_of(thinnest_m=0.0))
+    assert after(scan_of(10, 11, 200), rows=rows) == []
+    assert nothing_up_to(rows.view, 10) == math.inf
+    assert after(np.full(360, np.nan, np.float32), rows=rows) == []
+
+
 def test_at_first_nobody_has_looked_into_a_hole():
     assert after(scan_of(10, 11, 200)) == [10, 11, 200]
 

@@ -232,10 +232,7 @@ def was_free(see: View, x: float, y: float) -> bool:
 @jit_inner
 def _all_reach(scan: np.ndarray, first: int, last: int, far: float) -> bool:
     """Tell whether all beams from ``first`` to ``last`` of a kept scan reach so far [m]: any may have looked there."""
-    reach = math.inf
+    all_reach = True
     for n in range(first, last + 1):
-        s = abs(scan[n])
-        reach = min(reach, s) if s >= 0.0 else -1.0  # NaN: nobody knows
-        if reach < 0.0:
-            break
-    return bool(far <= reach)
+        all_reach &= abs(scan[n]) >= far  # NaN does not: nobody knows
+    return all_reach

@@ -32,7 +32,12 @@ def find_looked_through(see: View) -> None:
 
 @jit
 def nothing_up_to(see: View, n: int) -> float:
-    """Return up to which range, the body's surface at least, nothing can stand in the hole that beam n is in [m]."""
+    """Return up to which range, the body's surface at least, nothing can stand in the hole that beam n is in [m].
+
+    inf where nothing is narrow (`Guarding.thinnest_m` 0).
+    """
+    if not see.rig.guarding.thinnest_m > 0.0:
+        return math.inf
     sensor, radius, width = see.rig.sensor, see.rig.body.radius_m, 1
     for step in (1, -1):
         k = beam_at(n + step, sensor)
@@ -53,6 +58,8 @@ def shows_beside(width: int, rig: Rig) -> float:
 def _looked_through(see: View, n: int) -> bool:
     """Tell whether the last scan reached beyond the places along beam n from which on something may stand there."""
     rig, percept, reach = see.rig, see.percept, nothing_up_to(see, n)
+    if reach == math.inf:
+        return True
     here = (percept["odom_x"], percept["odom_y"], percept["odom_yaw"])
     for _ in range(PLACES):
         x, y, _yaw = then(here, (reach * rig.cos[n], reach * rig.sin[n], 0.0))

@@ -94,7 +94,8 @@ def _behind(ranges: np.ndarray, k: int, stop: int, rig: Rig) -> float:
     if not closed and (k == 0 or stop == total):
         return touching
     width = (stop - k + 1) * rig.sensor.increment
-    if width >= math.pi or (rig.sensor.range_min > touching and width * rig.sensor.range_min > rig.guarding.thinnest_m):
+    thinnest = rig.guarding.thinnest_m
+    if width >= math.pi or (rig.sensor.range_min > touching and 0.0 < thinnest < width * rig.sensor.range_min):
         return touching  # beyond the body something may stand too near to be measured
     fits = rig.guarding.others_smallest_m / math.sin(0.5 * width) - rig.guarding.others_smallest_m
     beside = min(float(ranges[(k - 1) % total]), float(ranges[stop % total]))
