@@ -119,7 +119,11 @@ def run(
     limit: Annotated[float | None, typer.Option(help="Time limit, simulated seconds, else 300.")] = None,
     set_: Annotated[
         list[str] | None,
-        typer.Option("--set", metavar="KEY.PATH=VALUE", help="Any key of a scenario; repeatable."),
+        typer.Option(
+            "--set",
+            metavar="KEY.PATH=VALUE",
+            help="Any key of a scenario; of a list by number: robot.1.radius_m=0.3; repeatable.",
+        ),
     ] = None,
     out: Annotated[
         Path | None,
@@ -289,6 +293,7 @@ def video(
     "[bold]swarmscope barn the-barn-challenge/jackal_helper/worlds/BARN --every 10[/bold]\n\n"
     "[bold]swarmscope barn BARN_dataset --planner nav-scope --planner mine.py --speed 1 --speed 2[/bold]\n\n"
     "[bold]swarmscope barn BARN_dataset --set safety.look_ahead_m=2 --worlds 0-49 --out barn.json[/bold]\n\n"
+    "[bold]swarmscope barn BARN_dataset --worlds 36 --runs runs/barn[/bold]\n\n"
     "[bold]swarmscope barn BARN_dataset --write-scenario 36 w36.yaml; swarmscope run w36.yaml[/bold]"
 )
 def barn(
@@ -305,6 +310,9 @@ def barn(
     every: Annotated[int, typer.Option(min=1, help="Only every so manieth world.")] = 1,
     workers: Workers = None,
     out: Annotated[Path | None, typer.Option(help="JSON file with every run.")] = None,
+    runs: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="Keep each run there, with its picture and its replay page.")
+    ] = None,
     write_scenario: Annotated[
         tuple[int, Path] | None,
         typer.Option(metavar="WORLD FILE", help="Write the scenario of one world for 'swarmscope run', run nothing."),
@@ -318,7 +326,7 @@ def barn(
     if write_scenario is not None:
         write_command(worlds_of, *write_scenario, planners, speeds, changes)
     else:
-        barn_command(worlds_of, planners, speeds, changes, worlds, every, workers, out, not no_code)
+        barn_command(worlds_of, planners, speeds, changes, worlds, every, workers, out, runs, not no_code)
 
 
 @app.command(
@@ -420,7 +428,7 @@ def reproduce(
 @experiments.command(
     "run",
     epilog="Examples:\n\n"
-    "[bold]swarmscope experiment run examples/doors.yaml --maps 20[/bold]\n\n"
+    "[bold]swarmscope experiment run doors.yaml --maps 20[/bold]\n\n"
     "[bold]swarmscope experiment run doors.yaml --engine ray --address 10.0.0.1:6379[/bold]",
 )
 def experiment_run(
