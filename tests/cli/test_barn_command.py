@@ -82,6 +82,17 @@ def test_of_many_failures_only_the_first_are_printed(npz, monkeypatch):
     assert said.count("time limit in state") == 1 and "... and 1 more" in said
 
 
+def test_runs_are_kept_with_picture_and_page(npz, tmp_path):
+    done = swarmscope("barn", npz, "--worlds", 1, "--workers", 1, "--speed", 1, "--speed", 2, "--runs", tmp_path / "kept")
+    assert done.exit_code == 0, done.stderr
+    folders = [tmp_path / "kept" / f"world-1-nav-scope-{speed}" for speed in (1, 2)]
+    assert done.stdout.splitlines()[-2:] == [str(folder / "replay.html") for folder in folders]
+    for folder in folders:
+        assert (folder / "paths.png").exists() and read_metrics(folder)["run"]["robots"] == 1
+    (tmp_path / "kept/world-1").write_text("precious")
+    assert "world-1: is a file" in refused("barn", npz, "--worlds", 1, "--runs", tmp_path / "kept")
+
+
 def test_a_worlds_scenario_can_be_written_and_run(npz, tmp_path):
     file = tmp_path / "w4.yaml"
     said = play(npz, "--write-scenario", 4, file, "--speed", 1.5, "--set", "safety.margin_m=0.05")
@@ -101,7 +112,7 @@ def test_a_worlds_scenario_can_be_written_and_run(npz, tmp_path):
 WRONG = {
     "no file": (["nowhere.npz"], ["nowhere.npz", "No such file"]),
     "world": (["--worlds", "1,2"], ["--worlds", "there is no world 2"]),
-    "worlds": (["--worlds", "x"], ["unknown set of seeds 'x'"]),
+    "worlds": (["--worlds", "x"], ["--worlds x: must look like 0,4,10-19"]),
     "planner": (["--planner", "nav-scop"], ["world 1: planner.name", "did you mean 'nav-scope'"]),
     "planner twice": (["--planner", "nav-i", "--planner", "nav-i"], ["--planner", "'nav-i' is there twice"]),
     "speed twice": (["--speed", "1", "--speed", "1.0"], ["--speed", "'1' is there twice"]),

@@ -10,11 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fake_run import make_fake_run
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 from PIL import Image
 
 from swarmscope.errors import InputFileError
 from swarmscope.sim.world import grid_from_solid
-from swarmscope.viewing.pictures import extent_of, write_picture
+from swarmscope.viewing.pictures import draw_obstacles, extent_of, write_picture
 from swarmscope.viewing.run_data import (
     WorldFile,
     crash_ticks,
@@ -76,6 +78,26 @@ def test_of_a_map_only_the_free_part_is_shown(yaw) -> None:
     assert shown_bounds(world) == pytest.approx(box)
     assert shown_bounds(world.model_copy(update={"bounds": (4.0, 0.0, 6.0, 9.0)}))[0] == 4.0 or yaw > 0.0
     assert shown_bounds(world.model_copy(update={"obstacles": []})) == world.bounds
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.3])
+@pytest.mark.parametrize("wide", [4.0, 7.3])
+def test_solid_parts_of_maps_have_no_seams(yaw, wide) -> None:
+    """A block of 240 x 160 cells is one even tone, however many pixels a cell takes."""
+    figure = Figure(figsize=(wide, 0.75 * wide), dpi=150)
+    canvas = FigureCanvasAgg(figure)
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    axes.set_axis_off()
+    axes.set_xlim(-6.0, 14.0)
+    axes.set_ylim(-4.0, 11.0)
+    draw_obstacles(axes, [grid_from_solid(np.ones((160, 240), np.uint8), 0.05, (1.0, 0.0), yaw)])
+    canvas.draw()
+    shown = np.asarray(canvas.buffer_rgba()).astype(int)
+    y, x = np.mgrid[11.0 : -4.0 : shown.shape[0] * 1j, -6.0 : 14.0 : shown.shape[1] * 1j]
+    along = (x - 1.0) * math.cos(yaw) + y * math.sin(yaw)
+    across = y * math.cos(yaw) - (x - 1.0) * math.sin(yaw)
+    inside = shown[(along > 0.2) & (along < 11.8) & (across > 0.2) & (across < 7.8)]
+    assert np.ptp(inside, axis=0).max() <= 1
 
 
 def test_close_pictures_show_where_robots_have_been(folder: Path) -> None:

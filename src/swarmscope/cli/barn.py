@@ -11,9 +11,10 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
+from swarmscope.api import add_pictures
 from swarmscope.barn.rules import scenario_of
 from swarmscope.barn.runs import Choice, Played, play_all
 from swarmscope.barn.summary import Pair, Row, as_dict, pairs_of, rows_of
@@ -25,11 +26,14 @@ from swarmscope.experiments.seeds import seed_set
 from swarmscope.experiments.warm_up import warm_up_jobs
 from swarmscope.experiments.work import work
 from swarmscope.judging.provenance import own_revision, versions
+from swarmscope.judging.run import run_scenario
+from swarmscope.judging.run_folder import check_out
 from swarmscope.scenarios.plain import plain
 from swarmscope.scenarios.scenario import Scenario
 from swarmscope.scenarios.to_kernels import planner_of
 from swarmscope.scenarios.written import written_out
 from swarmscope.user_files import short_name
+from swarmscope.viewing.progress import Bar
 from swarmscope.viewing.report.publish import put_in_place
 
 SHOWN_FAILURES = 20
@@ -46,15 +50,20 @@ def barn_command(
     every: int,
     workers: int | None,
     out: Path | None,
+    runs_in: Path | None,
     code: bool,
 ) -> None:
     """Play every planner at every speed in the same worlds and print what came out."""
     worlds = find_worlds(place)
-    numbers = chosen(worlds.numbers, [] if asked is None else seed_set(asked), every)
+    numbers = chosen(worlds.numbers, _asked(asked), every)
     choices = choices_of(planners, speeds)
     _check(worlds, numbers[0], choices, changes, code)
     if out is not None:
         _check_writable(out)
+    if runs_in is not None:
+        for number in numbers:
+            for choice in choices:
+                check_out(_folder(runs_in, number, choice, choices))
     _warm_up([choice.planner for choice in choices])
     with _progress_bar(len(numbers) * len(choices)) as progress:
         runs = play_all(worlds, numbers, choices, changes, workers, progress)
@@ -66,6 +75,9 @@ def barn_command(
     if out is not None:
         put_in_place(out.parent, {out.name: _as_json(rows, pairs, runs).encode()})
         print(out)
+    if runs_in is not None:
+        for folder in write_runs(runs_in, worlds, numbers, choices, changes):
+            print(folder / "replay.html")
 
 
 def write_command(
@@ -81,6 +93,33 @@ def write_command(
     put_in_place(file.parent, {file.name: written_out(scenario).encode()})
     print(f"{file} is there; run it:")
     print(f"  {shlex.join(['swarmscope', 'run', str(file)])}")
+
+
+def write_runs(
+    out: Path, worlds: Worlds, numbers: Sequence[int], choices: Sequence[Choice], changes: Sequence[str]
+) -> Iterator[Path]:
+    """Make a folder of each run, with picture and page, as ``swarmscope run`` does; yield it when it is done."""
+    for number in numbers:
+        world = worlds.read(number)
+        for choice in choices:
+            folder = _folder(out, number, choice, choices)
+            run_scenario(scenario_of(world, *choice, changes), folder, extras=add_pictures)
+            yield folder
+
+
+def _folder(out: Path, number: int, choice: Choice, choices: Sequence[Choice]) -> Path:
+    """Return the folder of a run; planner and speed are in its name where there are several."""
+    several = len(choices) > 1
+    return out / (f"world-{number}" + (f"-{short_name(choice.planner)}-{choice.speed_mps:g}" if several else ""))
+
+
+def _asked(text: str | None) -> list[int]:
+    """Return the numbers of ``--worlds``, none where nothing is asked."""
+    if text is None:
+        return []
+    if not set(text) <= set("0123456789-, "):
+        raise ConfigError(f"--worlds {text}", "must look like 0,4,10-19")
+    return seed_set(text)
 
 
 def choices_of(planners: Sequence[str], speeds: Sequence[float]) -> list[Choice]:
@@ -191,7 +230,7 @@ def _as_json(rows: Sequence[Row], pairs: Sequence[Pair], runs: Sequence[Played])
 def _progress_bar(total: int) -> Iterator[Callable[[int], None]]:
     """Show on stderr how many runs are done."""
     columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()
-    with Progress(
+    with Bar(
         *columns, TextColumn("left"), TimeRemainingColumn(), console=Console(stderr=True), transient=True
     ) as bar:
         job = bar.add_task("BARN", total=total)

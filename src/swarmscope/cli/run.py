@@ -19,7 +19,7 @@ from swarmscope.errors import ConfigError
 from swarmscope.experiments.warm_up import kernels_are_cold
 from swarmscope.judging.run import Watch, run_scenario
 from swarmscope.judging.run_folder import check_out, check_same
-from swarmscope.judging.run_names import usual_folder
+from swarmscope.judging.run_names import headline, usual_folder
 from swarmscope.scenarios.overrides import PLACES, choose, set_key, set_path
 from swarmscope.scenarios.read import parse_scenario, read_scenario_file
 from swarmscope.scenarios.scenario import Scenario
@@ -133,8 +133,7 @@ def _read_place(text: str, option: str) -> list[float]:
 def print_metrics(console: Console, metrics: dict[str, Any]) -> None:
     """Print the key figures as a table."""
     about = metrics["run"]
-    title = f"{about['task']} · {about['planner']} · {about['robots']} robots · seed {about['seed']}"
-    table = Table(title=title, show_header=False)
+    table = Table(title=headline(about, about["robots"]), show_header=False)
     table.add_column(style="bold")
     table.add_column(justify="right")
     for key, words, form in ROWS:

@@ -18,6 +18,8 @@ from swarmscope.user_files import is_file_name, read_code, whole_path
 
 REMEDIES = {"place.world.map": ": a map from a file is 'map: {file, starts, goals}' instead of 'place'"}
 """What to do about keys that people expect."""
+LISTS = {"robot": ", or a list with a data sheet for each robot"}
+"""What groups of keys may be instead."""
 
 
 KINDS = ("alike", "each")
@@ -101,14 +103,20 @@ def load_scenario(path: Path | str) -> Scenario:
 
 def _first_problem(error: ValidationError, where: str) -> ConfigError:
     """Turn pydantic's first error into ours."""
-    problem = error.errors()[0]
+    problems = error.errors()
+    # A key that is misspelt is why another one is missing.
+    problem = next((one for one in problems if one["type"] == "extra_forbidden"), problems[0])
     loc = tuple(part for part in problem["loc"] if part not in KINDS)
-    place = ".".join(str(p) for p in loc) or "(top)"
+    place = ".".join(str(p) for p in loc)
     message = str(problem["msg"]).removeprefix("Value error, ")
     if problem["type"] == "extra_forbidden":
         message = f"unknown key{nearest_hint(str(loc[-1]), _valid_keys(loc[:-1]))}"
         message += REMEDIES.get(place, "")
-    return ConfigError(f"{where}: {place}", message)
+    elif problem["type"] in ("model_type", "model_attributes_type"):
+        message = f"must be keys with values{LISTS.get(place, '')}, not {problem['input']!r}"
+    elif problem["type"] == "missing":
+        message = "is missing"
+    return ConfigError(f"{where}: {place}" if place else where, message)
 
 
 def _valid_keys(loc: tuple[int | str, ...]) -> list[str]:

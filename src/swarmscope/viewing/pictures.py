@@ -41,6 +41,8 @@ LONG_SIDE_IN = 9.0
 
 CLOSE_RADII = 10.0
 """What is shown round the robots' ways in a picture of only those, radii of a robot."""
+SEAM = 0.6
+"""Width of the lines round pieces of a map [pt]: thinner ones leave light seams between them."""
 PACKET_OPACITY, FEW_PACKETS = 0.55, 150
 """Of the line that stands for a packet; up to so many are drawn alike."""
 
@@ -153,7 +155,7 @@ def _draw_grid(axes: Axes, grid: Grid) -> None:
     low, left, right = side * runs[:, 0], side * runs[:, 1], side * (runs[:, 2] + 1.0)
     corners = np.array([[left, low], [right, low], [right, low + side], [left, low + side]])
     turned = np.array(grid.origin) + corners.transpose(2, 0, 1) @ np.array([[c, s], [-s, c]])
-    axes.add_collection(PolyCollection(list(turned), color=SOLID, lw=0.2))
+    axes.add_collection(PolyCollection(list(turned), color=SOLID, lw=SEAM))
 
 
 def _draw_packets(axes: Axes, run: RunData) -> None:

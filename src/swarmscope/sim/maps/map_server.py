@@ -42,7 +42,7 @@ def load_map(path: str | Path, resolution: float | None = None) -> Grid:
 
 def _picture_alone(path: Path, resolution: float | None) -> Grid:
     if resolution is None:
-        raise ConfigError(f"{path}: resolution", "a picture does not say how large its cells are: give it [m]")
+        raise ConfigError(f"{path}: resolution", "a picture does not say how large its cells are: give their side [m]")
     return as_grid(path, ~free_cells(path, Reading())[::-1], resolution, (0.0, 0.0))
 
 
