@@ -83,7 +83,8 @@ def test_of_many_failures_only_the_first_are_printed(npz, monkeypatch):
 
 
 def test_runs_are_kept_with_picture_and_page(npz, tmp_path):
-    done = swarmscope("barn", npz, "--worlds", 1, "--workers", 1, "--speed", 1, "--speed", 2, "--runs", tmp_path / "kept")
+    words = ("--worlds", 1, "--workers", 1, "--speed", 1, "--speed", 2)
+    done = swarmscope("barn", npz, *words, "--runs", tmp_path / "kept")
     assert done.exit_code == 0, done.stderr
     folders = [tmp_path / "kept" / f"world-1-nav-scope-{speed}" for speed in (1, 2)]
     assert done.stdout.splitlines()[-2:] == [str(folder / "replay.html") for folder in folders]
