@@ -114,8 +114,9 @@ def test_replay_refuses_what_is_no_finished_run(tmp_path):
 def test_planners_lists_parameters_with_defaults_and_meaning():
     result = swarmscope("planners")
     assert result.exit_code == 0
-    for words in ("nav-scope", "is given", "w_i", "0 is Nav-I", "patience_s"):
+    for words in ("nav-scope", "is given", "w_i", "0 is Nav-I", "patience_s", "Speed below which"):
         assert words in result.stdout
+    assert "``" not in result.stdout
 
 
 def test_tasks_lists_tasks_with_their_options():

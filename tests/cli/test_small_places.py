@@ -68,7 +68,7 @@ def parked_in_a_door(*walls):
 def test_goals_near_a_wall_are_refused_with_the_distance_that_would_do(tmp_path, goals, words):
     starts = [(x, -1, 1.5) for x, _ in goals]
     said = refused("run", written(tmp_path, place_scenario(starts, goals, [LINE], FLOOR)))
-    assert words in said and "0.18 m would do" in said
+    assert words in said and "0.18 m would do" in said and f"{tmp_path / 'scenario.yaml'}: " in said
     (tmp_path / "there").mkdir()
     _, run = run_of(tmp_path / "there", place_scenario(starts, [(x, 1.81) for x, _ in goals], [LINE], FLOOR))
     arrives(run)

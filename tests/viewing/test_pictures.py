@@ -111,6 +111,28 @@ def test_close_pictures_show_where_robots_have_been(folder: Path) -> None:
     assert extent_of(without_map) == pytest.approx((0.0, 0.0, 12.0, max(8.0, y.max() + 0.3)))
 
 
+def test_the_legend_names_what_is_there(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    named = []
+    legend = Figure.legend
+
+    def spy(self, handles, **more):
+        named.append([handle.get_label() for handle in handles])
+        return legend(self, handles=handles, **more)
+
+    monkeypatch.setattr(Figure, "legend", spy)
+    write_picture(folder)
+    file = folder / "world.json"
+    world = json.loads(file.read_text())
+    world["obstacles"].append({"type": "circle", "center": [1, 1], "radius": 0.1, "velocity": [0.1, 0]})
+    world["obstacles"].append({"type": "door", "points": [[1, 2], [2, 2]], "open_s": []})
+    file.write_text(json.dumps(world))
+    with np.load(folder / "trajectory.npz") as arrays:
+        ticks = len(arrays["t_s"])
+    rewrite_arrays(folder, disc_xy_m=np.zeros((ticks, 1, 2)), door_closed=np.zeros((ticks, 1), np.uint8))
+    write_picture(folder)
+    assert named[1] == [*named[0], "moves by itself", "door"]
+
+
 def test_picture_shows_packets(folder: Path) -> None:
     """Green as it looks on the ground, in the picture of a run in which features were sent, else nowhere."""
     green = (0.55 * np.array([0x3D, 0x8F, 0x7D]) + 0.45 * np.array([0xFB, 0xFA, 0xF7])).round()

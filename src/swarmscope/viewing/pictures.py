@@ -47,6 +47,7 @@ PACKET_OPACITY, FEW_PACKETS = 0.55, 150
 """Of the line that stands for a packet; up to so many are drawn alike."""
 
 WAY: dict[str, Any] = {"color": MOVER, "lw": 1.0, "ls": (0, (4, 3)), "zorder": 1}
+DOOR: dict[str, Any] = {"lw": 1.6, "ls": (0, (2, 1.5))}
 MOST_NUMBERS = 60
 """More robots have no numbers in the picture: one could not read them."""
 
@@ -128,7 +129,7 @@ def draw_obstacles(axes: Axes, obstacles: list[Obstacle]) -> None:
     walls = [obstacle.points for obstacle in obstacles if isinstance(obstacle, Wall)]
     axes.add_collection(LineCollection(walls, colors=WALL, linewidths=2.2, capstyle="round"))
     doors = [obstacle.points for obstacle in obstacles if isinstance(obstacle, Door)]
-    axes.add_collection(LineCollection(doors, colors=WALL, linewidths=1.6, linestyles=(0, (2, 1.5))))
+    axes.add_collection(LineCollection(doors, colors=WALL, **DOOR))
 
 
 def _draw_way(axes: Axes, disc: Circle) -> None:
@@ -208,10 +209,14 @@ def _draw_words(axes: Axes, figure: Any, run: RunData) -> None:
         entries.append(("features sent", "_", 9, PACKET, PACKET))
     if np.any(run.trajectory.collided):
         entries.append(("collision", "X", 8, CRASH, "white"))
+    if any(isinstance(obstacle, Circle) and obstacle.moves for obstacle in run.world.obstacles):
+        entries.append(("moves by itself", "o", 8, MOVER, SOLID_EDGE))
     handles = [
         Line2D([], [], ls="none", label=label, marker=marker, ms=size, mfc=face, mec=edge)
         for label, marker, size, face, edge in entries
     ]
+    if any(isinstance(obstacle, Door) for obstacle in run.world.obstacles):
+        handles.append(Line2D([], [], label="door", color=WALL, **DOOR))
     figure.legend(
         handles=handles,
         loc="lower left",
