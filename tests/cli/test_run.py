@@ -252,6 +252,16 @@ def test_broken_files_are_refused_with_the_reason(case, tmp_path):
     assert reason in said and "s.yaml" in said
 
 
+def test_maps_scenarios_and_trips_in_each_others_places_are_told_apart(tmp_path):
+    file = tmp_path / "map.yaml"
+    file.write_text("image: a.png\nresolution: 0.1\norigin: [0, 0, 0]\nnegate: 0\n")
+    (tmp_path / "s.yaml").write_text("task: {name: T1}\n")
+    assert f"is a map, not a scenario: run it with --map {file}" in refused("run", file)
+    assert "is no scenario; a map is run with --map" in refused("run", tmp_path / "a.png")
+    assert "is a scenario, not a map: run it without --map" in refused("run", "--map", tmp_path / "s.yaml")
+    assert "holds trips: give it as map.trips, --trips" in refused("run", "--map", "a.scen", "--resolution", 1)
+
+
 def test_a_file_that_is_not_text_is_refused(tmp_path):
     file = tmp_path / "s.yaml"
     file.write_bytes(b"\xff\xfe\x00task")

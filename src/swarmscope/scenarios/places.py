@@ -126,6 +126,8 @@ def _read_map(place: MapModel) -> tuple[Grid, list[Trip]]:
     """Return the cells of a scenario's map, and the trips that its file holds."""
     path = map_path(place.file)
     kind, side = path.suffix.lower(), place.resolution_m
+    if kind == ".scen":
+        raise ConfigError("map.file", f"{path} holds trips: give it as map.trips, --trips, beside its map")
     if kind in YAML and side is not None:
         raise ConfigError("map.resolution_m", f"{path} says it itself")
     if kind not in YAML and side is None:

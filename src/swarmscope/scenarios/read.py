@@ -7,7 +7,7 @@ from typing import Any, get_args
 
 from pydantic import ValidationError
 
-from swarmscope.errors import ConfigError, UnknownNameError, nearest_hint
+from swarmscope.errors import ConfigError, InputFileError, UnknownNameError, nearest_hint
 from swarmscope.onboard.planners import load_planner, planner_names
 from swarmscope.scenarios.costs import check_costs
 from swarmscope.scenarios.places import is_packaged
@@ -18,6 +18,8 @@ from swarmscope.user_files import is_file_name, read_code, whole_path
 
 REMEDIES = {"place.world.map": ": a map from a file is 'map: {file, starts, goals}' instead of 'place'"}
 """What to do about keys that people expect."""
+MAPS = (".png", ".pgm", ".ppm", ".bmp", ".jpg", ".jpeg", ".tif", ".tiff", ".map", ".npz", ".world")
+"""Ends of names of maps."""
 LISTS = {"robot": ", or a list with a data sheet for each robot"}
 """What groups of keys may be instead."""
 
@@ -54,9 +56,13 @@ def _check_known(kind: str, name: str, names: list[str], where: str) -> None:
 
 def read_scenario_file(path: Path) -> dict[str, Any]:
     """Return the mapping in YAML file ``path``, not validated yet; files are looked for beside it."""
+    if path.suffix.lower() in MAPS:
+        raise InputFileError(path, f"is no scenario; a map is run with --map {path}")
     values = read_yaml(path)
     if not isinstance(values, dict):
         raise ConfigError(str(path), "a scenario is a mapping of keys to values")
+    if {"image", "resolution"} <= values.keys():
+        raise InputFileError(path, f"is a map, not a scenario: run it with --map {path}")
     find_user_files(values, path.parent)
     place = values.get("map")
     if isinstance(place, dict) and isinstance(place.get("file"), str):
