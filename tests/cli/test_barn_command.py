@@ -61,6 +61,16 @@ def test_planners_are_compared_in_the_same_worlds(npz, tmp_path):
     assert "only nav-scope arrives in 0, only dh-bug in 0" in said
 
 
+def test_the_table_stands_upright_in_a_narrow_terminal(npz, capsys):
+    worlds = barn_module.find_worlds(npz)
+    choices = barn_module.choices_of(["nav-scope"], [1.0])
+    rows = barn_module.rows_of(barn_module.play_all(worlds, [1], choices, workers=1), choices)
+    for width, lines in ((150, 1), (80, 9)):
+        barn_module.print_rows(rows, "BARN", width)
+        said = capsys.readouterr().out
+        assert "…" not in said and "time, median" in said and said.count("│\n") == lines
+
+
 def test_without_a_path_file_the_shortest_way_counts(tmp_path):
     folder = write_folder(tmp_path / "BARN", OURS, paths=False)
     said = play(folder, "--workers", 1, "--out", tmp_path / "a.json")

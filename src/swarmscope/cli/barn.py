@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from rich.console import Console
+from rich.measure import Measurement
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
@@ -39,6 +40,8 @@ from swarmscope.viewing.report.publish import put_in_place
 SHOWN_FAILURES = 20
 WIDE = 150
 """Columns of a table that goes into a file or another program."""
+WORDS = ("planner", "m/s", "arrived", "95 %", "collisions", "score", "95 %", "time, median", "quartiles", "nearest")
+"""Of the table."""
 
 
 def barn_command(
@@ -68,7 +71,7 @@ def barn_command(
     with _progress_bar(len(numbers) * len(choices)) as progress:
         runs = play_all(worlds, numbers, choices, changes, workers, progress)
     rows, pairs = rows_of(runs, choices), pairs_of(runs, choices)
-    print_rows(rows, f"BARN, {len(numbers)} worlds of {place.name}")
+    print_rows(rows, f"BARN, {len(numbers)} world{'' if len(numbers) == 1 else 's'} of {place.name}")
     print_pairs(pairs)
     print_failures(runs)
     _print_own_paths(runs)
@@ -131,28 +134,44 @@ def choices_of(planners: Sequence[str], speeds: Sequence[float]) -> list[Choice]
     return [Choice(planner, speed) for planner in planners for speed in speeds]
 
 
-def print_rows(rows: Sequence[Row], title: str) -> None:
-    """Print the table, in full where nobody looks at a terminal."""
-    words = ("planner", "m/s", "arrived", "95 %", "collisions", "score", "95 %", "time, median", "quartiles", "nearest")
+def print_rows(rows: Sequence[Row], title: str, width: int | None = None) -> None:
+    """Print the table, a line for each planner and speed; a column where a terminal of ``width`` is too narrow."""
+    lines = [WORDS, *map(_cells, rows)]
+    if width is None and not sys.stdout.isatty():
+        width = WIDE
+    console = PlainConsole(width=width)
+    table = _table(lines, title)
+    if Measurement.get(console, console.options.update(width=WIDE), table).maximum > console.width:
+        table = _table(list(zip(*lines, strict=True)), title)
+    console.print(table)
+
+
+def _table(lines: Sequence[Sequence[str]], title: str) -> Table:
+    """Return the table of lines, the first of which is its head."""
     table = Table(title=title)
-    for k, word in enumerate(words):
+    for k, word in enumerate(lines[0]):
         table.add_column(word, justify="right" if k else "left", no_wrap=True)
-    for row in rows:
-        low, middle, high = row.quartiles_s
-        score, share = row.score, row.share
-        table.add_row(
-            short_name(row.planner),
-            f"{row.speed_mps:g}",
-            f"{row.arrived} of {row.worlds}",
-            f"{100.0 * share.low:.1f}-{100.0 * share.high:.1f} %",
-            str(row.collisions),
-            f"{score.estimate:.4f}",
-            _known("{:.4f}-{:.4f}", score.low, score.high),
-            _known("{:.1f} s", middle),
-            _known("{:.1f}-{:.1f} s", low, high),
-            _known("{:.3f} m", row.clearance_m),
-        )
-    PlainConsole(width=None if sys.stdout.isatty() else WIDE).print(table)
+    for line in lines[1:]:
+        table.add_row(*line)
+    return table
+
+
+def _cells(row: Row) -> list[str]:
+    """Return a row in words."""
+    low, middle, high = row.quartiles_s
+    score, share = row.score, row.share
+    return [
+        short_name(row.planner),
+        f"{row.speed_mps:g}",
+        f"{row.arrived} of {row.worlds}",
+        f"{100.0 * share.low:.1f}-{100.0 * share.high:.1f} %",
+        str(row.collisions),
+        f"{score.estimate:.4f}",
+        _known("{:.4f}-{:.4f}", score.low, score.high),
+        _known("{:.1f} s", middle),
+        _known("{:.1f}-{:.1f} s", low, high),
+        _known("{:.3f} m", row.clearance_m),
+    ]
 
 
 def _known(form: str, *values: float) -> str:
