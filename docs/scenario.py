@@ -33,7 +33,7 @@ swarmscope config --schema                       # the same as JSON schema, for 
 ```
 
 ```python
-swarmscope.simulate("T1", radio__loss=0.2, planner__params__w_i=0)      # the same keys, __ for the dot
+swarmscope.simulate("T1", radio__loss=0.2, planner__params__w_i=0)      # the same keys, __ for the dot: robot__1__radius_m=0.3, too
 ```
 
 A key that does not exist, or a value out of bounds, is an error that names the place and the nearest key.

@@ -82,6 +82,7 @@ def common(
     "[bold]swarmscope run --map willow_garage_office --robots 5 --seed 23[/bold]\n\n"
     "[bold]swarmscope run --map hall.yaml --start 1,2,90 --goal 8,2 --start 8,3 --goal 1,3[/bold]\n\n"
     "[bold]swarmscope run --map drawn.png --resolution 0.05 --robots 3[/bold]\n\n"
+    "[bold]swarmscope run examples/people.yaml --set robot.1.radius_m=0.35[/bold]\n\n"
     "[bold]swarmscope run runs/first/config.yaml --out runs/again[/bold]"
 )
 def run(
@@ -179,7 +180,7 @@ def perceive(
     ],
     out: Annotated[Path | None, typer.Option(help="Folder for features.csv and perceive.png.")] = None,
     topic: Annotated[str | None, typer.Option(help="Topic with the scans, where a bag has several.")] = None,
-    every: Annotated[int, typer.Option(min=1, help="Only every so manieth scan.")] = 1,
+    every: Annotated[int, typer.Option(min=1, help="Only every Nth scan.")] = 1,
     range_m: Annotated[float | None, typer.Option("--range", help="Range that the robots use, metres, else 5.")] = None,
     radius_m: Annotated[
         float | None, typer.Option("--radius", help="Radius and half width of the robot, metres, else 0.15.")
@@ -190,8 +191,10 @@ def perceive(
             "--set", metavar="KEY.PATH=VALUE", help="A scenario's key: robot, guard, safety, noise, lidar; repeatable."
         ),
     ] = None,
-    scenario: Annotated[Path | None, typer.Option(help="Scenario file with the robot's data sheet.")] = None,
-    beam_step: Annotated[int, typer.Option(min=1, help="Use every so manieth beam.")] = 1,
+    scenario: Annotated[
+        Path | None, typer.Option(help="Scenario file with the robot's data sheet, the largest one's of several.")
+    ] = None,
+    beam_step: Annotated[int, typer.Option(min=1, help="Use every Nth beam.")] = 1,
     no_return: Annotated[
         list[float] | None,
         typer.Option(help="A reading that means no return, beside inf: 0, -1, nan for some LiDARs; repeatable."),
@@ -307,7 +310,7 @@ def barn(
         list[str] | None, typer.Option("--set", metavar="KEY.PATH=VALUE", help="Any key of a scenario; repeatable.")
     ] = None,
     worlds: Annotated[str | None, typer.Option(help="Numbers and ranges: 0,4,10-19; else all.")] = None,
-    every: Annotated[int, typer.Option(min=1, help="Only every so manieth world.")] = 1,
+    every: Annotated[int, typer.Option(min=1, help="Only every Nth world.")] = 1,
     workers: Workers = None,
     out: Annotated[Path | None, typer.Option(help="JSON file with every run.")] = None,
     runs: Annotated[
