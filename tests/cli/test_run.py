@@ -252,6 +252,14 @@ def test_broken_files_are_refused_with_the_reason(case, tmp_path):
     assert reason in said and "s.yaml" in said
 
 
+def test_a_folder_or_a_file_without_an_ending_is_no_map(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "hall").mkdir()
+    (tmp_path / "floor").touch()
+    assert "hall: is a folder; a map is a file" in refused("run", "--map", "hall")
+    assert "floor: has no ending that says what kind" in refused("run", "--map", "floor", "--resolution", 1)
+
+
 def test_maps_scenarios_and_trips_in_each_others_places_are_told_apart(tmp_path):
     file = tmp_path / "map.yaml"
     file.write_text("image: a.png\nresolution: 0.1\norigin: [0, 0, 0]\nnegate: 0\n")
