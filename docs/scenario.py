@@ -11,7 +11,7 @@ import swarmscope
 from swarmscope.onboard.percept import MAX_INBOX, MAX_OUTBOX
 from swarmscope.onboard.planners import planner_names
 from swarmscope.onboard.sharing.message import REQUEST_BYTES
-from swarmscope.scenarios.keys import MUST, Key, planner_keys, scenario_keys, task_keys
+from swarmscope.scenarios.keys import MUST, Key, obstacle_keys, planner_keys, robot_keys, scenario_keys, task_keys
 from swarmscope.sim.state import QUEUE, Radio
 from swarmscope.tasks import task_names
 
@@ -28,16 +28,25 @@ a run folder's `config.yaml` holds everything. Exactly one of `task`, `map` and 
 ```sh
 swarmscope config T1 > my.yaml                   # a complete scenario, every key with its meaning
 swarmscope run my.yaml --set radio.loss=0.2      # any key of this page, over the file
+swarmscope run my.yaml --set robot.1.radius_m=0.3 --set map.goals.0=[8,2]     # parts of lists by their numbers, from 0 on
 swarmscope config --schema                       # the same as JSON schema, for editors
 ```
 
 ```python
-swarmscope.simulate("T1", radio__loss=0.2, planner__params__w_i=0)      # the same keys, __ for the dot
+swarmscope.simulate("T1", radio__loss=0.2, planner__params__w_i=0)      # the same keys, __ for the dot: robot__1__radius_m=0.3, too
 ```
 
 A key that does not exist, or a value out of bounds, is an error that names the place and the nearest key.
 
-`robot` may be a list with these keys for each robot, and `start_s` besides [s]; obstacles have keys of their own: both in [maps.md](maps.md).
+`robot` may be a list with a data sheet for each robot, and obstacles have keys of their own: [below](#robots-that-differ-and-obstacles), with examples in [maps.md](maps.md).
+"""
+
+LISTS = """## Robots that differ, and obstacles
+
+`robot` as a list holds the keys of `robot` for each robot, N = 0, 1, ..., all of them optional, and besides:
+"""
+
+OBSTACLES = """Each entry of `map.obstacles` and of `place.world.obstacles` names its `type`, {kinds}, and has the keys of that type:
 """
 
 RADIO = """## What the radio does with packets
@@ -118,12 +127,20 @@ def page() -> str:
         request=8e3 * (REQUEST_BYTES + link.overhead_bytes) / link.bitrate_bps,
         features=8e3 * (28 + link.overhead_bytes) / link.bitrate_bps,
     )
-    parts = [HEAD, "## Keys\n", table(scenario_keys()), radio, WRONG + formulas()]
+    parts = [HEAD, "## Keys\n", table(scenario_keys()), LISTS, table(robot_keys()), obstacles()]
+    parts += [radio, WRONG + formulas()]
     parts += ["## Options of the tasks\n\nSet with `task.options.NAME`; what tasks are for: [tasks.md](tasks.md).\n"]
     parts += grouped(task_names(), task_keys)
     parts += ["## Parameters of the planners\n\nSet with `planner.params.NAME`; who: [planners.md](planners.md).\n"]
     parts += grouped(planner_names(), planner_keys)
     return "\n".join(parts)
+
+
+def obstacles() -> str:
+    """Return a table of the keys of all obstacles."""
+    kinds = obstacle_keys()
+    words = OBSTACLES.format(kinds=", ".join(f"`{kind}`" for kind in kinds))
+    return f"{words}\n{table([key._replace(name=f'{kind}: {key.name}') for kind in kinds for key in kinds[kind]])}"
 
 
 def table(keys: list[Key]) -> str:

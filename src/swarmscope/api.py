@@ -20,6 +20,7 @@ from swarmscope.experiments.warm_up import kernels_are_cold
 from swarmscope.judging.references import References, reference_ways
 from swarmscope.judging.run import Contents, contents, play
 from swarmscope.judging.run_folder import WORLD, read_config, read_user_files, read_world, write_run
+from swarmscope.judging.run_names import headline
 from swarmscope.scenarios.overrides import choose, leave_only, override
 from swarmscope.scenarios.plain import plain
 from swarmscope.scenarios.read import parse_scenario, read_scenario_file
@@ -117,11 +118,8 @@ class Run:
     def __repr__(self) -> str:
         """Return one line with the key figures."""
         about, values = self.metrics.get("run") or {}, self.metrics
-        what = [str(about[key]) for key in ("task", "planner") if key in about]
-        what.append(f"{len(self.world['robots'])} robots")
-        what += [f"seed {about['seed']}"] if "seed" in about else []
         figures = [form.format(values[key]) for key, form in KEY_FIGURES if values.get(key) is not None]
-        return f"<Run {' · '.join(what)}: {', '.join(figures)}>"
+        return f"<Run {headline(about, len(self.world['robots']))}: {', '.join(figures)}>"
 
 
 def simulate(

@@ -70,6 +70,13 @@ def test_a_place_is_a_task_a_file_a_mapping_or_a_scenario(tmp_path):
     assert PLACE["place"]["world"]["obstacles"] == [WALL]
 
 
+def test_robots_of_a_list_go_by_their_numbers():
+    run = simulate("swap", robot=[{}, {"v_max_mps": 0.7}], robot__1__radius_m=0.3, robot__0__start_s=1.0, limit_s=1)
+    sheets = run.scenario["robot"]
+    assert [(sheet["radius_m"], sheet["start_s"]) for sheet in sheets] == [(0.15, 1.0), (0.3, 0.0)]
+    assert sheets[1]["v_max_mps"] == 0.7
+
+
 def test_a_map_takes_the_place_of_the_task():
     run = simulate(map__file="willow_garage_office", robots=1, limit_s=1, record_scans="no")
     assert run.metrics["run"]["task"] == "willow_garage_office" and "task" not in run.scenario
@@ -81,6 +88,7 @@ WRONG = {
     "key at the top": ({"limits": 1}, r"^simulate: limits: unknown key; did you mean 'limit_s'\?"),
     "value": ({"radio__loss": 1.5}, r"^simulate: radio\.loss: .*less than or equal to 1"),
     "no group": ({"limit_s": 3, "limit_s__x": 1}, r"^simulate: limit_s\.x: 'limit_s' is not a group"),
+    "list": ({"robot": [{}, {}], "robot__2__radius_m": 1}, r"^simulate: robot\.2\.radius_m: 'robot' is a list of 2"),
     "planner": ({"planner": "nav-scop"}, "did you mean 'nav-scope'"),
     "robots": ({"robots": 0}, "^simulate: robots: "),
     "parameter": ({"planner__params__w_ii": 1}, "did you mean 'w_i'"),

@@ -61,6 +61,16 @@ def test_planners_are_compared_in_the_same_worlds(npz, tmp_path):
     assert "only nav-scope arrives in 0, only dh-bug in 0" in said
 
 
+def test_the_table_stands_upright_in_a_narrow_terminal(npz, capsys):
+    worlds = barn_module.find_worlds(npz)
+    choices = barn_module.choices_of(["nav-scope"], [1.0])
+    rows = barn_module.rows_of(barn_module.play_all(worlds, [1], choices, workers=1), choices)
+    for width, lines in ((150, 1), (80, 9)):
+        barn_module.print_rows(rows, "BARN", width)
+        said = capsys.readouterr().out
+        assert "…" not in said and "time, median" in said and said.count("│\n") == lines
+
+
 def test_without_a_path_file_the_shortest_way_counts(tmp_path):
     folder = write_folder(tmp_path / "BARN", OURS, paths=False)
     said = play(folder, "--workers", 1, "--out", tmp_path / "a.json")
@@ -82,6 +92,18 @@ def test_of_many_failures_only_the_first_are_printed(npz, monkeypatch):
     assert said.count("time limit in state") == 1 and "... and 1 more" in said
 
 
+def test_runs_are_kept_with_picture_and_page(npz, tmp_path):
+    words = ("--worlds", 1, "--workers", 1, "--speed", 1, "--speed", 2)
+    done = swarmscope("barn", npz, *words, "--runs", tmp_path / "kept")
+    assert done.exit_code == 0, done.stderr
+    folders = [tmp_path / "kept" / f"world-1-nav-scope-{speed}" for speed in (1, 2)]
+    assert done.stdout.splitlines()[-2:] == [str(folder / "replay.html") for folder in folders]
+    for folder in folders:
+        assert (folder / "paths.png").exists() and read_metrics(folder)["run"]["robots"] == 1
+    (tmp_path / "kept/world-1").write_text("precious")
+    assert "world-1: is a file" in refused("barn", npz, "--worlds", 1, "--runs", tmp_path / "kept")
+
+
 def test_a_worlds_scenario_can_be_written_and_run(npz, tmp_path):
     file = tmp_path / "w4.yaml"
     said = play(npz, "--write-scenario", 4, file, "--speed", 1.5, "--set", "safety.margin_m=0.05")
@@ -101,7 +123,7 @@ def test_a_worlds_scenario_can_be_written_and_run(npz, tmp_path):
 WRONG = {
     "no file": (["nowhere.npz"], ["nowhere.npz", "No such file"]),
     "world": (["--worlds", "1,2"], ["--worlds", "there is no world 2"]),
-    "worlds": (["--worlds", "x"], ["unknown set of seeds 'x'"]),
+    "worlds": (["--worlds", "x"], ["--worlds x: must look like 0,4,10-19"]),
     "planner": (["--planner", "nav-scop"], ["world 1: planner.name", "did you mean 'nav-scope'"]),
     "planner twice": (["--planner", "nav-i", "--planner", "nav-i"], ["--planner", "'nav-i' is there twice"]),
     "speed twice": (["--speed", "1", "--speed", "1.0"], ["--speed", "'1' is there twice"]),

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import csv
 import re
+import shlex
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,6 +18,7 @@ import swarmscope as package
 from swarmscope.cli.main import app
 from swarmscope.sim.scan_files import SCAN_FOLDER
 
+ROOT = Path(__file__).parents[2]
 SCANS = "malaga_telecom_2006_sick_lms"
 COMMANDS = ("run", "perceive", "replay", "mcap", "video", "planners", "tasks")
 
@@ -71,7 +74,7 @@ def test_perceive_refuses_impossible_robots(words, tmp_path):
 def test_perceive_says_when_it_cannot_write(tmp_path):
     (tmp_path / "file").touch()
     result = swarmscope("perceive", SCANS, "--out", tmp_path / "file")
-    assert result.exit_code == 2 and "cannot be written" in result.stderr
+    assert result.exit_code == 2 and "is a file; features and the picture go into a folder" in result.stderr
 
 
 def test_replay_makes_page_and_picture_anew(tmp_path):
@@ -111,8 +114,9 @@ def test_replay_refuses_what_is_no_finished_run(tmp_path):
 def test_planners_lists_parameters_with_defaults_and_meaning():
     result = swarmscope("planners")
     assert result.exit_code == 0
-    for words in ("nav-scope", "is given", "w_i", "0 is Nav-I", "patience_s"):
+    for words in ("nav-scope", "is given", "w_i", "0 is Nav-I", "patience_s", "Speed below which"):
         assert words in result.stdout
+    assert "``" not in result.stdout
 
 
 def test_tasks_lists_tasks_with_their_options():
@@ -132,6 +136,29 @@ def test_help_of_every_command_has_an_example(command):
 def test_help_lists_all_commands_and_no_arguments_show_it():
     assert all(f" {command} " in swarmscope("--help").stdout for command in COMMANDS)
     assert "Usage" in CliRunner().invoke(app, []).output
+
+
+def commands_in(group, before=()):
+    """Every command below a group, with the words that call it."""
+    for name, one in group.commands.items():
+        yield from commands_in(one, (*before, name)) if hasattr(one, "commands") else [((*before, name), one)]
+
+
+def test_examples_of_help_can_be_copied():
+    """Each is a command that there is, with options and values that it takes; what it names of the clone is there."""
+    command = typer.main.get_command(app)
+    known, seen = dict(commands_in(command)), 0
+    for one in known.values():
+        for example in re.findall(r"\[bold](.*?)\[/bold]", one.epilog or ""):
+            for part in example.split(";"):
+                words = shlex.split(part.partition(">")[0])
+                if words[0] != "swarmscope":
+                    continue
+                called = next(name for name in known if tuple(words[1 : 1 + len(name)]) == name)
+                known[called].make_context(words[1], words[1 + len(called) :])
+                seen += 1
+                assert all((ROOT / word).exists() for word in words if word.startswith("examples/")), example
+    assert seen > 25
 
 
 def test_version():

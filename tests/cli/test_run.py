@@ -124,6 +124,28 @@ def test_another_task_takes_the_place_of_the_files(tmp_path):
     assert config["task"]["name"] == "swap" and "map" not in config
 
 
+def test_parts_of_lists_are_set_by_their_numbers(tmp_path):
+    """Also of two that are one in the file, by an alias of YAML."""
+    places = "starts: [[-2, 0, 0], [2, 0, 3.14]]\n  goals: [[2, 1], [-2, 1]]"
+    moves = "{type: circle, center: [0, 3], radius: 0.2, velocity: [0.1, 0]}"
+    world = f"place:\n  world: {{bounds: [-5, -5, 5, 5], obstacles: [{moves}]}}\n  {places}\n"
+    (tmp_path / "s.yaml").write_text(world + "robot: [&it {radius_m: 0.2, half_width_m: 0.2}, *it]\nlimit_s: 1\n")
+    words = []
+    for change in ("robot.0.radius_m=0.3", "place.goals.1=[-3, -2]", "place.starts.0.1=-1"):
+        words += ["--set", change]
+    words += ["--set", "place.world.obstacles.0.velocity=[0, 0.1]", "--no-pictures", "--out", tmp_path / "r"]
+    assert swarmscope("run", tmp_path / "s.yaml", *words).exit_code == 0
+    config = read_config(tmp_path / "r")
+    assert [sheet["radius_m"] for sheet in config["robot"]] == [0.3, 0.2]
+    assert (config["place"]["goals"][1], config["place"]["starts"][0]) == ([-3, -2], [-2, -1, 0])
+    assert config["place"]["world"]["obstacles"][0]["velocity"] == [0, 0.1]
+
+
+def test_nothing_but_words_where_nobody_looks_at_a_terminal(tmp_path):
+    done = swarmscope("run", "--task", "T1", "--robots", 1, "--limit", 1, "--no-pictures", "--out", tmp_path / "r")
+    assert done.stderr == "" and "· 1 robot ·" in done.stdout
+
+
 def test_a_setting_of_the_task_alone_means_t1(tmp_path):
     swarmscope("run", *SMALL[2:], "--set", "task.options.density=0.1", "--out", tmp_path / "r")
     assert read_config(tmp_path / "r")["task"]["name"] == "T1"
@@ -172,6 +194,16 @@ WRONG = {
     "group": (["--set", "planer.name=x"], ["planer", "did you mean 'planner'"]),
     "value": (["--set", "radio.loss=a lot"], ["radio.loss", "must be a number"]),
     "range": (["--set", "radio.loss=1.5"], ["radio.loss", "less than or equal to 1"]),
+    "misspelt key instead of one that must be": (["--set", "map.flie=x"], ["map.flie: unknown key", "'file'"]),
+    "group that is none": (["--set", "robot=3"], ["robot: must be keys with values, or a list", "not 3"]),
+    "other number than sheets": (["--set", "robot=[{}, {}]", "--robots", 3], ["line: 2 data sheets", "leave 'robots'"]),
+    "number in what is no list": (["--set", "robot.0.radius_m=1"], ["'robot' is not a list", "leave '.0' out"]),
+    "number that is not there": (
+        ["--set", "robot=[{}, {}]", "--set", "robot.2.radius_m=1"],
+        ["'robot' is a list of 2: 'robot.0' to 'robot.1'"],
+    ),
+    "no number": (["--set", "robot=[{}]", "--set", "robot.radius_m=1"], ["'robot' is a list of 1: 'robot.0'"]),
+    "in a list": (["--set", "robot=[{}]", "--set", "robot.0.radius=1"], ["robot.0.radius", "did you mean 'radius_m'"]),
     "path into a value": (["--seed", "1", "--set", "seed.x=1"], ["--set seed.x=1", "'seed' is not a group"]),
     "no equals": (["--set", "radio"], ["--set radio", "key.path=value"]),
     "empty key": (["--set", "radio..loss=1"], ["key.path=value"]),
@@ -218,6 +250,24 @@ def test_broken_files_are_refused_with_the_reason(case, tmp_path):
     file.write_text(text)
     said = refused("run", file, "--out", tmp_path / "r")
     assert reason in said and "s.yaml" in said
+
+
+def test_a_folder_or_a_file_without_an_ending_is_no_map(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "hall").mkdir()
+    (tmp_path / "floor").touch()
+    assert "hall: is a folder; a map is a file" in refused("run", "--map", "hall")
+    assert "floor: has no ending that says what kind" in refused("run", "--map", "floor", "--resolution", 1)
+
+
+def test_maps_scenarios_and_trips_in_each_others_places_are_told_apart(tmp_path):
+    file = tmp_path / "map.yaml"
+    file.write_text("image: a.png\nresolution: 0.1\norigin: [0, 0, 0]\nnegate: 0\n")
+    (tmp_path / "s.yaml").write_text("task: {name: T1}\n")
+    assert f"is a map, not a scenario: run it with --map {file}" in refused("run", file)
+    assert "is no scenario; a map is run with --map" in refused("run", tmp_path / "a.png")
+    assert "is a scenario, not a map: run it without --map" in refused("run", "--map", tmp_path / "s.yaml")
+    assert "holds trips: give it as map.trips, --trips" in refused("run", "--map", "a.scen", "--resolution", 1)
 
 
 def test_a_file_that_is_not_text_is_refused(tmp_path):

@@ -165,6 +165,7 @@ def test_folders_that_are_none(tmp_path):
     assert "no rosbag2" in refused("perceive", tmp_path)
     (tmp_path / "metadata.yaml").write_text("a: 1\n")
     assert "torn or foreign bag" in refused("perceive", tmp_path)
+    assert f"name the folder, {tmp_path}" in refused("perceive", tmp_path / "metadata.yaml")
     bag = write(tmp_path, two_scans)
     next(bag.glob("*.db3")).unlink()
     assert "missing" in refused("perceive", bag)

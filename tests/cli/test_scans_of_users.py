@@ -342,3 +342,68 @@ def test_motion_is_said_where_nobody_knows_it(tmp_path):
     assert "put right for the robot's own motion" in swarmscope("perceive", file, "--speed", 1).stdout
     for words in (("--time-increment", "nan"), ("--speed", "inf"), ("--time-increment", 1)):
         assert words[0] in refused("perceive", file, "--speed", 1, *words)
+
+
+def runs(*pieces, separator=","):
+    """A line of readings: each a value and how often it comes."""
+    return separator.join(separator.join([value] * count) for value, count in pieces)
+
+
+def head(first, step, least=0.1, longest=12, **more):
+    fields = {"angle_min": first, "angle_increment": step, "range_min": least, "range_max": longest} | more
+    return "# " + " ".join(f"{name}={value}" for name, value in fields.items())
+
+
+ROUND, TURTLE = head(-3.141592654, 0.01745329252), head(0, 0.01745329238, 0.12, 3.5)
+HALF = head(-1.5708, 0.0174533, longest=30)
+POSTS = [("inf", 44), *[("0.1000", 3), ("inf", 87)] * 3, ("0.1000", 3), ("inf", 43)]
+MASKS = [word for at in (-135, -45, 45, 135) for word in ("--mask", f"{at - 1.5}..{at + 1.5}")]
+FIELDS = "header.seq header.stamp header.frame_id angle_min angle_max angle_increment time_increment scan_time"
+FIELDS += " range_min range_max " + " ".join(f"{name}{n}" for name in ("ranges", "intensities") for n in range(8))
+ECHO = "%time," + ",".join(f"field.{name}" for name in FIELDS.split())
+ECHO += "\n1550000000000000000,7,1550000000000000000,laser,-0.7,0.7,0.2,0.0,0.1,0.1,10.0,"
+ECHO += runs(("1.5", 8), ("47.0", 8))
+REPORTED = {
+    "zeros": ([TURTLE, runs(("0.0000", 20), ("1.8000", 60), ("0.0000", 280))], [], "300 of 360: 300 block", 0),
+    "zeros, said": ([TURTLE, runs(("0.0000", 20), ("1.8000", 60), ("0.0000", 280))], ["--no-return", 0], "300", 286),
+    "infinities": ([TURTLE, runs(("inf", 20), ("1.8000", 60), ("inf", 280))], [], "300 of 360", 286),
+    "NaN here and there": (
+        [ROUND, runs(*(piece for n in (10, 74, 74, 69, 79) for piece in (("inf", n), ("nan", 1))), ("inf", 49))],
+        [],
+        "5 of 360: 5 bridged",
+        360,
+    ),
+    "NaN ahead": ([ROUND, runs(("inf", 180), ("nan", 1), ("inf", 179))], [], "1 of 360: 1 bridged", 360),
+    "NaN in a room": ([ROUND, runs(("4.0000", 180), ("nan", 1), ("4.0000", 179))], [], "1 of 360: 1 bridged", 360),
+    "clockwise": ([head(3.141592654, -0.01745329252, 0.15), runs(("0.6000", 60), ("inf", 300))], [], "", 262),
+    "its reverse": ([head(-3.12413936, 0.01745329252, 0.15), runs(("inf", 300), ("0.6000", 60))], [], "", 262),
+    "a circle": ([head(0, 0.01749303564, 0.12, 3.5), runs(("inf", 360))], [], "360 over 360 degrees", 360),
+    "posts": ([head(-3.141592654, 0.01745329252, 0.05), runs(*POSTS)], [], "--mask FROM..TO", 0),
+    "posts, said": ([head(-3.141592654, 0.01745329252, 0.05), runs(*POSTS)], MASKS, "12 of 360: 12 bridged", 360),
+    "rostopic echo": ([ECHO], [], "8 over 80 degrees", 0),
+    "rostopic echo with a header": ([head(-0.7, 0.2, longest=10), ECHO], [], "8 over 80 degrees", 0),
+    "a message's header": (
+        ["# frame_id=laser angle_max=3.12414 time_increment=0.0 scan_time=0.1 " + ROUND[2:], runs(("inf", 360))],
+        [],
+        "360 of 360",
+        360,
+    ),
+    "beams that vary": ([head(0, 0.013808, 0.02), runs(("3.0", 455)), runs(("3.0", 456))], [], "rays than most", 456),
+    "-1": ([ROUND, runs(("inf", 5), ("-1.0000", 1), ("inf", 354))], [], "1 of 360: 1 bridged", 360),
+    "semicolons": ([HALF, runs(("3.0", 181), separator=";")], [], "181 over 180 degrees", 121),
+    "spaces": ([HALF, runs(("3.0", 181), separator=" ")], [], "181 over 180 degrees", 121),
+    "a last comma": ([HALF, runs(("3.0", 181)) + ","], [], "181 over 180 degrees", 121),
+    "lines of Windows": ([HALF + "\r", runs(("3.0", 181)) + "\r"], [], "181 over 180 degrees", 121),
+    "degrees": ([head(-90, 1, longest=30), runs(("3.0", 181))], [], "read as degrees", 121),
+    "millimetres": ([HALF, runs(("3000", 181))], [], "read as millimetres", 121),
+}
+"""Files of public reports: lines, options, words of the answer, safe directions."""
+
+
+@pytest.mark.parametrize("name", REPORTED)
+def test_files_of_public_reports(tmp_path, name):
+    lines, options, words, safe = REPORTED[name]
+    (tmp_path / "scan.csv").write_bytes(("\n".join(lines) + "\n").encode())
+    done = swarmscope("perceive", tmp_path / "scan.csv", *options)
+    said = " ".join(done.output.split())
+    assert done.exit_code == 0 and words in said and f"│ {safe:.1f} of " in said

@@ -4,6 +4,8 @@ import resource
 import sqlite3
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
+from threading import Barrier
 
 import numpy as np
 import pytest
@@ -156,6 +158,18 @@ def test_a_new_metric_gets_a_column(tmp_path, monkeypatch, answers):
         store.add(answers[1]._replace(figures=answers[1].figures | {"stops": 3.0}))
         runs = {run.key: run.figures["stops"] for run in store.runs(keyed_units(small()))}
     assert runs[answers[0].key] is None and runs[answers[1].key] == 3.0
+
+
+def test_many_may_make_the_same_store_at_once(tmp_path):
+    def opened(path):
+        begin.wait(30.0)
+        with Store(path) as store:
+            return store.check()
+
+    with ThreadPoolExecutor(6) as pool:
+        for k in range(20):
+            begin = Barrier(6)
+            assert list(pool.map(opened, [tmp_path / f"{k}.sqlite"] * 6)) == ["ok"] * 6
 
 
 def test_nowhere_to_write(tmp_path):

@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from helpers import run_scenario
-from swarmscope.errors import ConfigError, SwarmscopeError, UnsolvableWorldError
+from swarmscope.errors import ConfigError, InputFileError, SwarmscopeError, UnsolvableWorldError
 from swarmscope.scenarios.places import make_setup
 from swarmscope.scenarios.read import load_scenario, parse_scenario
 from swarmscope.sim.maps import save_map
@@ -134,7 +134,7 @@ def test_trips_of_a_moving_ai_map(tmp_path):
     assert setup.starts[:, :2] == pytest.approx(np.array([[1.25, 2.25], [5.25, 0.75]]))
     assert setup.goals == pytest.approx(np.array([[5.25, 3.25], [0.75, 0.75]]))
     for old, new, message in (
-        ("robots: 2", "robots: 3", "there are 3 trips, not 1 and 3 more: ask for fewer 'robots'"),
+        ("robots: 2", "robots: 3", "3 robots take trips 1 to 3, and there are 3: ask for fewer 'robots'"),
         ("resolution_m: 0.5, ", "", r"map\.resolution_m: .*a\.map does not say how large"),
     ):
         (tmp_path / "s.yaml").write_text(place.replace(old, new))
@@ -159,12 +159,24 @@ def test_a_maze_of_orion(tmp_path):
     assert setup.goals == pytest.approx(np.array([[9.5, 1.5], [10.5, 6.5]]))
     assert len(setup_of(tmp_path / "mazes.npz", map=place | {"number": 3}, robots=4).starts) == 4  # none in it: drawn
     for changes, robots, message in (
-        ({"number": 4}, 2, r"map\.number: .*mazes\.npz has no maze 4; it has 2, 3, 5"),
+        ({"number": 4}, 2, r"map\.number: .*mazes\.npz has no maze 4; it has 2: 3, 5"),
         ({"number": None}, 2, r"map\.number: .* holds many mazes"),
-        ({}, 3, "there are 2 trips, not 0 and 3 more: ask for fewer 'robots'"),
+        ({}, 3, "3 robots take trips 0 to 2, and there are 2: ask for fewer 'robots'"),
     ):
         with pytest.raises(ConfigError, match=message):
             setup_of(tmp_path / "mazes.npz", map=place | changes, robots=robots)
+
+
+def test_files_in_which_there_is_nowhere_to_be_are_refused_with_why(tmp_path):
+    """Black ink on nothing, as layers of drawings are saved; and BARN's worlds, which have a command of their own."""
+    ink = np.zeros((80, 120, 4), np.uint8)
+    ink[..., 3] = 255 * two_rooms()
+    Image.fromarray(ink).save(tmp_path / "ink.png")
+    with pytest.raises(UnsolvableWorldError, match="dark, transparent or unknown is not free"):
+        setup_of(tmp_path / "ink.png", map={"resolution_m": 0.1})
+    np.savez(tmp_path / "barn.npz", centers_m=np.zeros((3, 2)), world=np.arange(1))
+    with pytest.raises(InputFileError, match=r"no file of ORION's mazes.*worlds of BARN are for 'swarmscope barn'"):
+        setup_of(tmp_path / "barn.npz", map={"resolution_m": 1.0, "number": 0})
 
 
 def test_a_map_within_a_written_out_world_is_refused_with_the_remedy():

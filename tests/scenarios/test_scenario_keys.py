@@ -11,7 +11,16 @@ import pytest
 import yaml
 
 from swarmscope.onboard.planners import planner_names
-from swarmscope.scenarios.keys import MUST, docs_of, meanings, planner_keys, scenario_keys, task_keys
+from swarmscope.scenarios.keys import (
+    MUST,
+    docs_of,
+    meanings,
+    obstacle_keys,
+    planner_keys,
+    robot_keys,
+    scenario_keys,
+    task_keys,
+)
 from swarmscope.scenarios.read import parse_scenario
 from swarmscope.scenarios.scenario import Scenario
 from swarmscope.scenarios.to_kernels import complete
@@ -40,6 +49,17 @@ def test_what_people_look_for_is_on_the_page():
         assert words in text
     for words in ("`max_wait_s` = 0.5 s", "`packets_crowded_out`", "bandwidth limit"):
         assert words in text
+
+
+def test_keys_of_lists_are_on_the_page():
+    assert [key.name for key in robot_keys()] == ["robot.N.start_s"]
+    kinds = obstacle_keys()
+    assert sorted(kinds) == ["circle", "door", "grid", "polygon", "wall"]
+    assert {key.name for key in kinds["circle"]} > {"center", "radius", "velocity", "way", "repeat"}
+    assert {key.name for key in kinds["door"]} == {"points", "open_s", "every_s"}
+    assert all(key.meaning for kind in kinds.values() for key in kind)
+    text = (DOCS / "scenario.md").read_text(encoding="utf-8")
+    assert all(f"| `{name}` |" in text for name in ("robot.N.start_s", "circle: way", "door: open_s"))
 
 
 def test_a_complete_scenario_holds_the_keys_that_are_listed():

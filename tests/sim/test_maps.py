@@ -156,6 +156,40 @@ def test_every_cell_is_read_as_nav2_reads_it(tmp_path, mode, kind, seed):
     assert np.array_equal(solid_from_grid(grid)[::-1] == 0, expected)
 
 
+@pytest.mark.parametrize("mode", ["trinary", "scale", "raw"])
+@pytest.mark.parametrize("kind", ["P", "P one", "P all", "L one", "RGB one", "1"])
+@pytest.mark.parametrize("seed", range(3))
+def test_palettes_and_transparent_colours_are_read_as_nav2_reads_them(tmp_path, mode, kind, seed):
+    """Paint programs write few colours as a palette; one of them may be transparent, or each as much as it likes."""
+    rng = np.random.default_rng([seed, len(kind), len(mode)])
+    colours = rng.choice([0, 1, 50, 127, 205, 250, 254, 255], (6, 4))
+    colours[:, 3] = np.where(rng.random(6) < 0.5, 255, colours[:, 3])
+    channels, _, extra = kind.partition(" ")
+    if channels == "L":
+        colours[:, 1] = colours[:, 2] = colours[:, 0]
+    if channels == "1":
+        colours = np.array([[0, 0, 0, 255], [255, 255, 255, 255]])
+    numbers = rng.integers(len(colours), size=(9, 11))
+    options = {}
+    if extra != "all":
+        clear = tuple(colours[0, :3].tolist())
+        colours[:, 3] = [0 if extra == "one" and tuple(colour) == clear else 255 for colour in colours[:, :3].tolist()]
+    if channels == "P":
+        image = Image.fromarray(numbers.astype(np.uint8))
+        image.putpalette(colours[:, :3].astype(np.uint8).tobytes())
+        options = {"transparency": bytes(colours[:, 3].tolist())} if extra else {}
+    else:
+        image = Image.fromarray(colours[numbers][..., :3].astype(np.uint8)).convert(channels)
+        options = {"transparency": clear[0] if channels == "L" else clear} if extra else {}
+    image.save(tmp_path / "map.png", **options)
+    settings = {"negate": int(rng.integers(2)), "free_thresh": 0.196, "occupied_thresh": 0.65}
+    shown = (tmp_path / "map.png").read_bytes()
+    grid = load_map(write_map(tmp_path, shown, "map.png", image="map.png", mode=mode, **settings))
+    pixels = colours[numbers] if extra else colours[numbers][..., :3]
+    expected = [[nav2_cell(pixel.tolist(), 255, mode, settings) == 0 for pixel in row] for row in pixels]
+    assert np.array_equal(solid_from_grid(grid)[::-1] == 0, expected)
+
+
 def test_the_picture_may_lie_anywhere(tmp_path, monkeypatch):
     expected = load_map(write_map(tmp_path))
     home, other = tmp_path / "home", tmp_path / "other"

@@ -10,11 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fake_run import make_fake_run
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 from PIL import Image
 
 from swarmscope.errors import InputFileError
 from swarmscope.sim.world import grid_from_solid
-from swarmscope.viewing.pictures import extent_of, write_picture
+from swarmscope.viewing.pictures import draw_obstacles, extent_of, write_picture
 from swarmscope.viewing.run_data import (
     WorldFile,
     crash_ticks,
@@ -78,6 +80,26 @@ def test_of_a_map_only_the_free_part_is_shown(yaw) -> None:
     assert shown_bounds(world.model_copy(update={"obstacles": []})) == world.bounds
 
 
+@pytest.mark.parametrize("yaw", [0.0, 0.3])
+@pytest.mark.parametrize("wide", [4.0, 7.3])
+def test_solid_parts_of_maps_have_no_seams(yaw, wide) -> None:
+    """A block of 240 x 160 cells is one even tone, however many pixels a cell takes."""
+    figure = Figure(figsize=(wide, 0.75 * wide), dpi=150)
+    canvas = FigureCanvasAgg(figure)
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    axes.set_axis_off()
+    axes.set_xlim(-6.0, 14.0)
+    axes.set_ylim(-4.0, 11.0)
+    draw_obstacles(axes, [grid_from_solid(np.ones((160, 240), np.uint8), 0.05, (1.0, 0.0), yaw)])
+    canvas.draw()
+    shown = np.asarray(canvas.buffer_rgba()).astype(int)
+    y, x = np.mgrid[11.0 : -4.0 : shown.shape[0] * 1j, -6.0 : 14.0 : shown.shape[1] * 1j]
+    along = (x - 1.0) * math.cos(yaw) + y * math.sin(yaw)
+    across = y * math.cos(yaw) - (x - 1.0) * math.sin(yaw)
+    inside = shown[(along > 0.2) & (along < 11.8) & (across > 0.2) & (across < 7.8)]
+    assert np.ptp(inside, axis=0).max() <= 1
+
+
 def test_close_pictures_show_where_robots_have_been(folder: Path) -> None:
     """1.5 m round everything, which is ten radii; else the whole world."""
     run = load_run(folder)
@@ -87,6 +109,28 @@ def test_close_pictures_show_where_robots_have_been(folder: Path) -> None:
     assert extent_of(run, close=True) == pytest.approx(box)
     without_map = replace(run, world=run.world.model_copy(update={"obstacles": []}))
     assert extent_of(without_map) == pytest.approx((0.0, 0.0, 12.0, max(8.0, y.max() + 0.3)))
+
+
+def test_the_legend_names_what_is_there(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    named = []
+    legend = Figure.legend
+
+    def spy(self, handles, **more):
+        named.append([handle.get_label() for handle in handles])
+        return legend(self, handles=handles, **more)
+
+    monkeypatch.setattr(Figure, "legend", spy)
+    write_picture(folder)
+    file = folder / "world.json"
+    world = json.loads(file.read_text())
+    world["obstacles"].append({"type": "circle", "center": [1, 1], "radius": 0.1, "velocity": [0.1, 0]})
+    world["obstacles"].append({"type": "door", "points": [[1, 2], [2, 2]], "open_s": []})
+    file.write_text(json.dumps(world))
+    with np.load(folder / "trajectory.npz") as arrays:
+        ticks = len(arrays["t_s"])
+    rewrite_arrays(folder, disc_xy_m=np.zeros((ticks, 1, 2)), door_closed=np.zeros((ticks, 1), np.uint8))
+    write_picture(folder)
+    assert named[1] == [*named[0], "moves by itself", "door"]
 
 
 def test_picture_shows_packets(folder: Path) -> None:

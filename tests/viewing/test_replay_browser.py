@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import time
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -242,6 +243,30 @@ def test_messages_are_drawn_when_they_flow(page: Any, folder: Path) -> None:
         find(page, "show-links").click()
         assert (pixels(page) != shown) == differs
         find(page, "show-links").click()
+
+
+def test_words_beside_a_robot_stand_one_below_the_other(page: Any, folder: Path) -> None:
+    """What it chose, and what it said to others who chose at the same time."""
+    with np.load(folder / "trajectory.npz") as recorded:
+        choices, t_s = recorded["choices"], recorded["t_s"]
+    page.execute_script(
+        "window.words = []; const fill = CanvasRenderingContext2D.prototype.fillText;"
+        "CanvasRenderingContext2D.prototype.fillText = function (text, x, y) {"
+        "if (/^(chose )?(left|right)/.test(text)) words.push([x, y]); fill.call(this, text, x, y); };"
+    )
+    pairs = 0
+    for row in np.flatnonzero(choices[:, 5] >= 1)[:60]:
+        page.execute_script("swarmscope.select(arguments[0])", int(choices[row, 1]))
+        pixels(page)  # it is drawn
+        page.execute_script("words.length = 0")
+        seek(page, float(t_s[int(choices[row, 0])]) + 0.1)
+        pixels(page)
+        places = sorted({(round(x, 2), round(y, 2)) for x, y in ask(page, "words")})
+        for (x, y), (other_x, other_y) in pairwise(places):
+            if x == other_x and abs(y - other_y) < 40.0:
+                pairs += 1
+                assert abs(y - other_y) > 10.0
+    assert pairs > 0
 
 
 def test_who_said_what_when_a_side_was_chosen(page: Any, folder: Path) -> None:

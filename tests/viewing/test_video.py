@@ -137,7 +137,7 @@ def test_refused_videos(folder: Path, tmp_path: Path, monkeypatch: pytest.Monkey
         with pytest.raises(ConfigError, match=words.replace(".", r"\.")):
             write_video(folder, tmp_path / name, film)
     monkeypatch.setattr(write, "find_spec", lambda name: None)
-    with pytest.raises(MissingExtraError, match=r"a\.mp4 \(a \.gif does not\) needs .*swarmscope\[video\]"):
+    with pytest.raises(MissingExtraError, match=r"a\.mp4: an \.mp4, unlike a \.gif, needs .*swarmscope\[video\]"):
         write_video(folder, tmp_path / "a.mp4")
     assert list(tmp_path.iterdir()) == []
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from swarmscope.cli._console import PlainConsole
@@ -43,6 +43,7 @@ from swarmscope.errors import ConfigError
 from swarmscope.experiments.seeds import seed_set
 from swarmscope.judging.provenance import own_revision, versions
 from swarmscope.scenarios.keys import docs_of
+from swarmscope.viewing.progress import Bar
 from swarmscope.viewing.report.publish import put_in_place
 
 COLLIDED = 1
@@ -291,7 +292,7 @@ def print_table(all_rows: Sequence[Row], title: str, printed: bool) -> None:
 def progress_bar(choice: Choice, runs: int) -> Iterator[Report]:
     """Show how many runs are done, and for a user's controller how slow it is."""
     columns = TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[note]}"), TimeElapsedColumn()
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
         job = bar.add_task(choice.label, total=runs, note=f"0 of {runs} runs")
         told = False
 
@@ -313,7 +314,7 @@ def progress_bar(choice: Choice, runs: int) -> Iterator[Report]:
 def waiting(what: str) -> Iterator[None]:
     """Show that something is under way."""
     columns = TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn()
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
         bar.add_task(what, total=None)
         yield
 

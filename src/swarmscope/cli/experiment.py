@@ -9,7 +9,7 @@ from pathlib import Path
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
 from swarmscope.cli._code import announce, files_of, refuse_code
@@ -27,6 +27,7 @@ from swarmscope.experiments.experiment import (
 )
 from swarmscope.experiments.store import Store
 from swarmscope.experiments.weight import estimate_weight
+from swarmscope.viewing.progress import Bar
 
 MOST_ERRORS = 5
 
@@ -159,7 +160,7 @@ def write(
 @contextmanager
 def progress_bar(name: str) -> Iterator[Report]:
     """Show how many runs are done, the time that it took and the time left, while the body runs."""
-    with Progress(
+    with Bar(
         TextColumn("{task.description}"),
         BarColumn(),
         MofNCompleteColumn(),

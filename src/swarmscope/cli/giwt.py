@@ -10,13 +10,14 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import BarColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
 from swarmscope.cli._console import PlainConsole
 from swarmscope.errors import ConfigError, MissingExtraError
 from swarmscope.learning.generate import DRIVEN, PLACED, generate, totals, verify
 from swarmscope.scenarios.overrides import read_value
+from swarmscope.viewing.progress import Bar
 
 RADII_SAMPLES = 4_000
 """Samples of each set on which networks are scored for every radius."""
@@ -316,10 +317,10 @@ def _resumable(how: str) -> Iterator[None]:
 
 
 @contextmanager
-def _bar() -> Iterator[Progress]:
+def _bar() -> Iterator[Bar]:
     columns = (
         TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[note]}"), TimeElapsedColumn(),
         TimeRemainingColumn(),
     )  # fmt: skip
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
         yield bar

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import sys
 
+from rich.markup import escape
 from rich.table import Table
 
 from swarmscope.bounds import Value, about
 from swarmscope.cli._console import PlainConsole
 from swarmscope.onboard.planners import load_planner, planner_names
-from swarmscope.scenarios.keys import docs_of
+from swarmscope.scenarios.keys import planner_keys
 from swarmscope.tasks import load_task, task_names
 from swarmscope.tasks._contract import all_options
 
@@ -25,9 +26,9 @@ def list_planners() -> None:
         console.print(f"[bold]{name}[/bold]  {planner.summary.removeprefix(f'{name}: ')}")
         console.print(f"  is given: {planner.needs}", highlight=False)
         table = Table("planner.params", "default", "takes", "meaning")
-        docs = docs_of(planner.params_type)
-        for field in planner.fields.values():
-            table.add_row(field.name, str(field.default), about(field), docs.get(field.name, ""))
+        meanings = [escape(key.meaning.replace("``", "")) for key in planner_keys(name)]
+        for field, meaning in zip(planner.fields.values(), meanings, strict=True):
+            table.add_row(field.name, str(field.default), about(field), meaning)
         console.print(table)
 
 

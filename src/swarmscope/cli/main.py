@@ -82,6 +82,7 @@ def common(
     "[bold]swarmscope run --map willow_garage_office --robots 5 --seed 23[/bold]\n\n"
     "[bold]swarmscope run --map hall.yaml --start 1,2,90 --goal 8,2 --start 8,3 --goal 1,3[/bold]\n\n"
     "[bold]swarmscope run --map drawn.png --resolution 0.05 --robots 3[/bold]\n\n"
+    "[bold]swarmscope run examples/people.yaml --set robot.1.radius_m=0.35[/bold]\n\n"
     "[bold]swarmscope run runs/first/config.yaml --out runs/again[/bold]"
 )
 def run(
@@ -119,7 +120,11 @@ def run(
     limit: Annotated[float | None, typer.Option(help="Time limit, simulated seconds, else 300.")] = None,
     set_: Annotated[
         list[str] | None,
-        typer.Option("--set", metavar="KEY.PATH=VALUE", help="Any key of a scenario; repeatable."),
+        typer.Option(
+            "--set",
+            metavar="KEY.PATH=VALUE",
+            help="Any key of a scenario; of a list by number: robot.1.radius_m=0.3; repeatable.",
+        ),
     ] = None,
     out: Annotated[
         Path | None,
@@ -175,7 +180,7 @@ def perceive(
     ],
     out: Annotated[Path | None, typer.Option(help="Folder for features.csv and perceive.png.")] = None,
     topic: Annotated[str | None, typer.Option(help="Topic with the scans, where a bag has several.")] = None,
-    every: Annotated[int, typer.Option(min=1, help="Only every so manieth scan.")] = 1,
+    every: Annotated[int, typer.Option(min=1, help="Only every Nth scan.")] = 1,
     range_m: Annotated[float | None, typer.Option("--range", help="Range that the robots use, metres, else 5.")] = None,
     radius_m: Annotated[
         float | None, typer.Option("--radius", help="Radius and half width of the robot, metres, else 0.15.")
@@ -186,8 +191,10 @@ def perceive(
             "--set", metavar="KEY.PATH=VALUE", help="A scenario's key: robot, guard, safety, noise, lidar; repeatable."
         ),
     ] = None,
-    scenario: Annotated[Path | None, typer.Option(help="Scenario file with the robot's data sheet.")] = None,
-    beam_step: Annotated[int, typer.Option(min=1, help="Use every so manieth beam.")] = 1,
+    scenario: Annotated[
+        Path | None, typer.Option(help="Scenario file with the robot's data sheet, the largest one's of several.")
+    ] = None,
+    beam_step: Annotated[int, typer.Option(min=1, help="Use every Nth beam.")] = 1,
     no_return: Annotated[
         list[float] | None,
         typer.Option(help="A reading that means no return, beside inf: 0, -1, nan for some LiDARs; repeatable."),
@@ -289,6 +296,7 @@ def video(
     "[bold]swarmscope barn the-barn-challenge/jackal_helper/worlds/BARN --every 10[/bold]\n\n"
     "[bold]swarmscope barn BARN_dataset --planner nav-scope --planner mine.py --speed 1 --speed 2[/bold]\n\n"
     "[bold]swarmscope barn BARN_dataset --set safety.look_ahead_m=2 --worlds 0-49 --out barn.json[/bold]\n\n"
+    "[bold]swarmscope barn BARN_dataset --worlds 36 --runs runs/barn[/bold]\n\n"
     "[bold]swarmscope barn BARN_dataset --write-scenario 36 w36.yaml; swarmscope run w36.yaml[/bold]"
 )
 def barn(
@@ -302,9 +310,12 @@ def barn(
         list[str] | None, typer.Option("--set", metavar="KEY.PATH=VALUE", help="Any key of a scenario; repeatable.")
     ] = None,
     worlds: Annotated[str | None, typer.Option(help="Numbers and ranges: 0,4,10-19; else all.")] = None,
-    every: Annotated[int, typer.Option(min=1, help="Only every so manieth world.")] = 1,
+    every: Annotated[int, typer.Option(min=1, help="Only every Nth world.")] = 1,
     workers: Workers = None,
     out: Annotated[Path | None, typer.Option(help="JSON file with every run.")] = None,
+    runs: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="Keep each run there, with its picture and its replay page.")
+    ] = None,
     write_scenario: Annotated[
         tuple[int, Path] | None,
         typer.Option(metavar="WORLD FILE", help="Write the scenario of one world for 'swarmscope run', run nothing."),
@@ -318,7 +329,7 @@ def barn(
     if write_scenario is not None:
         write_command(worlds_of, *write_scenario, planners, speeds, changes)
     else:
-        barn_command(worlds_of, planners, speeds, changes, worlds, every, workers, out, not no_code)
+        barn_command(worlds_of, planners, speeds, changes, worlds, every, workers, out, runs, not no_code)
 
 
 @app.command(
@@ -420,7 +431,7 @@ def reproduce(
 @experiments.command(
     "run",
     epilog="Examples:\n\n"
-    "[bold]swarmscope experiment run examples/doors.yaml --maps 20[/bold]\n\n"
+    "[bold]swarmscope experiment run doors.yaml --maps 20[/bold]\n\n"
     "[bold]swarmscope experiment run doors.yaml --engine ray --address 10.0.0.1:6379[/bold]",
 )
 def experiment_run(

@@ -26,6 +26,8 @@ GROUPS = ("robot", "guard", "safety", "noise", "radio")
 
 def perceive_command(scans: str, out: Path | None, ask: Ask, use: Use) -> None:
     """Print what a robot makes of recorded scans; with ``out`` write features and a picture there."""
+    if out is not None and out.exists() and not out.is_dir():
+        raise ConfigError(f"--out {out}", "is a file; features and the picture go into a folder")
     log = load_scans(scan_file(scans), ask)
     for note in log.notes:
         print(f"{scans}: {note}", file=sys.stderr)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,11 +16,11 @@ from swarmscope.api import add_pictures
 from swarmscope.bounds import number_of
 from swarmscope.cli._code import announce, files_of, refuse_code
 from swarmscope.cli._console import PlainConsole
-from swarmscope.errors import ConfigError
+from swarmscope.errors import ConfigError, UnsolvableWorldError
 from swarmscope.experiments.warm_up import kernels_are_cold
 from swarmscope.judging.run import Watch, run_scenario
 from swarmscope.judging.run_folder import check_out, check_same
-from swarmscope.judging.run_names import usual_folder
+from swarmscope.judging.run_names import headline, usual_folder
 from swarmscope.scenarios.overrides import PLACES, choose, set_key, set_path
 from swarmscope.scenarios.read import parse_scenario, read_scenario_file
 from swarmscope.scenarios.scenario import Scenario
@@ -89,13 +90,24 @@ def run_command(
     if kernels_are_cold(scenario.planner.name):
         print("compiling the kernels for the first time (about 40 s, kept on disk) ...", file=sys.stderr)
     exact = Exact() if make.mcap else None
-    with progress_bar(scenario) as progress:
+    with progress_bar(scenario) as progress, _named(file):
         metrics = run_scenario(scenario, place, threads, progress, *_extras(make, exact))
     print_metrics(PlainConsole(), metrics)
     print_failures(metrics["failures"])
     made = ["paths.png", "replay.html"] if make.pictures else ["metrics.json"]
     for name in [*made, MCAP] if make.mcap else made:
         print(place / name)
+
+
+@contextmanager
+def _named(file: Path | None) -> Iterator[None]:
+    """Name the scenario's file in what is wrong with the place that it describes."""
+    try:
+        yield
+    except (ConfigError, UnsolvableWorldError) as error:
+        if file is None:
+            raise
+        raise ConfigError(str(file), str(error)) from None
 
 
 def _extras(make: Make, exact: Exact | None) -> tuple[Callable[[Path], None], Watch]:
@@ -133,8 +145,7 @@ def _read_place(text: str, option: str) -> list[float]:
 def print_metrics(console: Console, metrics: dict[str, Any]) -> None:
     """Print the key figures as a table."""
     about = metrics["run"]
-    title = f"{about['task']} · {about['planner']} · {about['robots']} robots · seed {about['seed']}"
-    table = Table(title=title, show_header=False)
+    table = Table(title=headline(about, about["robots"]), show_header=False)
     table.add_column(style="bold")
     table.add_column(justify="right")
     for key, words, form in ROWS:

@@ -17,6 +17,7 @@ import csv
 import json
 import os
 import sqlite3
+import time
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -35,6 +36,8 @@ APPLICATION = 0x73776D73  # "swms"
 VERSION = 1
 BUSY_S = 60.0
 """How long a writer waits for another one."""
+AGAIN_S = 0.01
+"""After this it tries again where SQLite itself does not wait."""
 FIGURES = tuple(dict.fromkeys([*(m.name for m in (*METRICS, *COUNTED)), *MEASURED]))
 TEXTS = ("config", "robots", "failures", "cases", "digest", "git", "code", "swarmscope", "python", "numpy", "numba")
 JSON = ("config", "robots", "failures", "cases")
@@ -85,14 +88,15 @@ class Store:
         self._db.close()
 
     def _open(self) -> None:
-        (application,) = self._db.execute("PRAGMA application_id").fetchone()
-        (version,) = self._db.execute("PRAGMA user_version").fetchone()
-        (tables,) = self._db.execute("SELECT count(*) FROM sqlite_master").fetchone()
+        with self._transaction("DEFERRED"):  # all of one moment: another process may be making the store
+            (application,) = self._db.execute("PRAGMA application_id").fetchone()
+            (version,) = self._db.execute("PRAGMA user_version").fetchone()
+            (tables,) = self._db.execute("SELECT count(*) FROM sqlite_master").fetchone()
         if application not in (0, APPLICATION) or (application == 0 and tables > 0):
             raise InputFileError(self.path, "is a database, but not a store of swarmscope; left as it is")
         if version > VERSION:
             raise InputFileError(self.path, f"was written by a newer swarmscope (format {version}, known: {VERSION})")
-        self._db.execute("PRAGMA journal_mode=WAL")
+        self._write_ahead()
         self._db.execute("PRAGMA synchronous=NORMAL")
         if version < VERSION:
             with self._transaction():
@@ -100,10 +104,27 @@ class Store:
                     self._db.execute(statement)
                 self._db.execute(f"PRAGMA application_id={APPLICATION}")
                 self._db.execute(f"PRAGMA user_version={VERSION}")
-        known = {row[1] for row in self._db.execute("PRAGMA table_info(runs)")}
-        for name in FIGURES:
-            if name not in known:  # a metric that was added since
-                self._db.execute(f"ALTER TABLE runs ADD COLUMN {name} REAL")
+        if set(FIGURES) <= self._columns():
+            return
+        with self._transaction():
+            for name in FIGURES:
+                if name not in self._columns():  # a metric that was added since
+                    self._db.execute(f"ALTER TABLE runs ADD COLUMN {name} REAL")
+
+    def _write_ahead(self) -> None:
+        """Keep changes in a log of their own. SQLite does not wait for another process that does this right now."""
+        begun = time.monotonic()
+        while True:
+            try:
+                self._db.execute("PRAGMA journal_mode=WAL")
+                return
+            except sqlite3.OperationalError as error:
+                if error.sqlite_errorcode & 0xFF != sqlite3.SQLITE_BUSY or time.monotonic() - begun > BUSY_S:
+                    raise
+            time.sleep(AGAIN_S)
+
+    def _columns(self) -> set[str]:
+        return {row[1] for row in self._db.execute("PRAGMA table_info(runs)")}
 
     def add(self, result: Finished) -> None:
         """Keep a finished unit, or why it failed; a key that is there already stays as it is."""
@@ -232,8 +253,8 @@ class Store:
             return {key for key in keys if self._db.execute(query, (key,)).fetchone() is not None}
 
     @contextmanager
-    def _transaction(self) -> Iterator[None]:
-        self._db.execute("BEGIN IMMEDIATE")
+    def _transaction(self, kind: str = "IMMEDIATE") -> Iterator[None]:
+        self._db.execute(f"BEGIN {kind}")
         try:
             yield
         except BaseException:

@@ -1,4 +1,4 @@
-"""What the folder of a run is called, so that no other run is written over it."""
+"""What a run is called, and its folder, so that no other run is written over it."""
 
 from __future__ import annotations
 
@@ -15,6 +15,15 @@ from swarmscope.scenarios.to_kernels import complete
 from swarmscope.user_files import short_name
 
 DIGITS = 6
+
+
+def headline(about: Mapping[str, Any], robots: int) -> str:
+    """Return what was run in one line, such as ``T1 · nav-scope · 15 robots · seed 0``."""
+    parts = [str(about[key]) for key in ("task", "planner") if about.get(key) is not None]
+    parts.append(f"{robots} robot{'' if robots == 1 else 's'}")
+    if about.get("seed") is not None:
+        parts.append(f"seed {about['seed']}")
+    return " · ".join(parts)
 
 
 def usual_folder(scenario: Scenario) -> Path:

@@ -12,7 +12,8 @@ from typing import Any, NamedTuple, get_args
 
 from swarmscope.bounds import Field, about
 from swarmscope.onboard.planners import load_planner
-from swarmscope.scenarios.scenario import Scenario
+from swarmscope.scenarios.scenario import RobotModel, RobotOfMany, Scenario
+from swarmscope.sim.world import WorldSpec
 from swarmscope.tasks import load_task
 from swarmscope.tasks._contract import option_fields
 
@@ -44,6 +45,19 @@ def scenario_keys() -> list[Key]:
     """Return every key of a scenario in the order of the models; groups are no keys."""
     schema = Scenario.model_json_schema()
     return list(_keys(schema, schema["$defs"], ""))
+
+
+def robot_keys() -> list[Key]:
+    """Return the keys of one robot's data sheet in a list of them that a data sheet for all has not."""
+    schema = RobotOfMany.model_json_schema()
+    return [key for key in _keys(schema, {}, "robot.N.") if key.name.rpartition(".")[2] not in RobotModel.model_fields]
+
+
+def obstacle_keys() -> dict[str, list[Key]]:
+    """Return the keys of each type of obstacle."""
+    groups = WorldSpec.model_json_schema()["$defs"]
+    kinds = {field["properties"]["type"]["const"]: field for field in groups.values()}
+    return {kind: [key for key in _keys(kinds[kind], groups, "") if key.name != "type"] for kind in sorted(kinds)}
 
 
 def meanings() -> dict[str, str]:
@@ -142,7 +156,8 @@ def _key(name: str, takes: str, default: Any, text: str) -> Key:
     inside = BRACKETS.search(text)
     unit = inside[1] if inside else UNITS.get(name.rpartition(".")[2].rpartition("_")[2], "")
     words = " ".join(BRACKETS.sub("", text, count=1).split())
-    return Key(name, takes, default, unit, words[:1].upper() + words[1:].rstrip("."))
+    first = words[:1] if words[1:2] == "," else words[:1].upper()  # x, y stay small
+    return Key(name, takes, default, unit, first + words[1:].rstrip("."))
 
 
 def _texts(fields: Mapping[str, Any], prefix: str) -> Iterator[tuple[str, str]]:

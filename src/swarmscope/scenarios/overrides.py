@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from copy import copy
 from typing import Any
 
 import yaml
@@ -14,6 +15,8 @@ from swarmscope.scenarios.plain import plain
 from swarmscope.texts import load_yaml
 
 PLACES = ("task", "map", "place")
+MOST_DIGITS = 9
+"""Of a number in a path: no list is as long."""
 
 
 def choose(values: dict[str, Any], group: str, key: str, value: str) -> None:
@@ -41,15 +44,34 @@ def set_key(values: dict[str, Any], change: str) -> None:
 
 
 def set_path(values: dict[str, Any], path: Sequence[str], value: Any, where: str) -> None:
-    """Set the value at ``path`` of the nested mapping; ``where`` begins the error when a part is no group."""
+    """Set the value at ``path`` of the nested mapping; a part of a list goes by its number, from 0 on.
+
+    ``where`` begins the error when there is no such place. What is on the way is copied: parts of a file may be one and
+    the same thing, by YAML's aliases.
+    """
     at: Any = values
-    *parents, last = path
-    for part in parents:
-        at = at.setdefault(part, {})
-        if not isinstance(at, dict):
-            many = " but a list: change it in the file" if isinstance(at, list) else ""
-            raise ConfigError(where, f"'{part}' is not a group of keys{many}")
-    at[last] = value
+    for depth, part in enumerate(path[:-1]):
+        key = _key_in(at, path[:depth], part, where)
+        inside = at[key] if isinstance(at, list) else at.get(key, {})
+        at[key] = inside = copy(inside)
+        at = inside
+    at[_key_in(at, path[:-1], path[-1], where)] = value
+
+
+def _key_in(at: Any, before: Sequence[str], part: str, where: str) -> Any:
+    """Return the key or the number that ``part`` is in ``at``, which lies at the path ``before``."""
+    name = ".".join(before)
+    if isinstance(at, list):
+        if not at:
+            raise ConfigError(where, f"'{name}' is an empty list")
+        if not (part.isascii() and part.isdigit() and len(part) < MOST_DIGITS and int(part) < len(at)):
+            raise ConfigError(where, f"'{name}' is a list of {len(at)}: '{name}.0' to '{name}.{len(at) - 1}'")
+        return int(part)
+    if not isinstance(at, dict):
+        raise ConfigError(where, f"'{name}' is not a group of keys")
+    if before and part.isdigit():
+        raise ConfigError(where, f"'{name}' is not a list: leave '.{part}' out, or make it one in the file")
+    return part
 
 
 def override(values: dict[str, Any], changes: Mapping[str, Any], where: str) -> None:

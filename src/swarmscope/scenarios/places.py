@@ -117,7 +117,8 @@ def _world_of_map(place: MapModel) -> tuple[WorldSpec, Grid | None, list[Trip]]:
 def _some_trips(trips: list[Trip], first: int, robots: int) -> list[Trip]:
     if first + robots > len(trips):
         remedy = "ask for fewer 'robots'" if first == 0 else "ask for fewer 'robots', or begin earlier"
-        raise ConfigError("map.first_trip", f"there are {len(trips)} trips, not {first} and {robots} more: {remedy}")
+        why = f"{robots} robots take trips {first} to {first + robots - 1}, and there are {len(trips)}: {remedy}"
+        raise ConfigError("map.first_trip", why)
     return trips[first : first + robots]
 
 
@@ -125,13 +126,16 @@ def _read_map(place: MapModel) -> tuple[Grid, list[Trip]]:
     """Return the cells of a scenario's map, and the trips that its file holds."""
     path = map_path(place.file)
     kind, side = path.suffix.lower(), place.resolution_m
+    if kind == ".scen":
+        raise ConfigError("map.file", f"{path} holds trips: give it as map.trips, --trips, beside its map")
     if kind in YAML and side is not None:
         raise ConfigError("map.resolution_m", f"{path} says it itself")
     if kind not in YAML and side is None:
-        raise ConfigError("map.resolution_m", f"{path} does not say how large its cells are: give it [m]")
+        why = f"{path} does not say how large its cells are: give their side [m], --resolution"
+        raise ConfigError("map.resolution_m", why)
     if kind == ".npz" and side is not None:
         if place.number is None:
-            raise ConfigError("map.number", f"{path} holds many mazes: say which one, or --number")
+            raise ConfigError("map.number", f"{path} holds many mazes: say which one, --number")
         return load_maze(path, place.number, side)
     if place.number is not None:
         raise ConfigError("map.number", f"{path} holds one map only")

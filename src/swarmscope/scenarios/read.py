@@ -7,7 +7,7 @@ from typing import Any, get_args
 
 from pydantic import ValidationError
 
-from swarmscope.errors import ConfigError, UnknownNameError, nearest_hint
+from swarmscope.errors import ConfigError, InputFileError, UnknownNameError, nearest_hint
 from swarmscope.onboard.planners import load_planner, planner_names
 from swarmscope.scenarios.costs import check_costs
 from swarmscope.scenarios.places import is_packaged
@@ -18,6 +18,10 @@ from swarmscope.user_files import is_file_name, read_code, whole_path
 
 REMEDIES = {"place.world.map": ": a map from a file is 'map: {file, starts, goals}' instead of 'place'"}
 """What to do about keys that people expect."""
+MAPS = (".png", ".pgm", ".ppm", ".bmp", ".jpg", ".jpeg", ".tif", ".tiff", ".map", ".npz", ".world")
+"""Ends of names of maps."""
+LISTS = {"robot": ", or a list with a data sheet for each robot"}
+"""What groups of keys may be instead."""
 
 
 KINDS = ("alike", "each")
@@ -52,9 +56,13 @@ def _check_known(kind: str, name: str, names: list[str], where: str) -> None:
 
 def read_scenario_file(path: Path) -> dict[str, Any]:
     """Return the mapping in YAML file ``path``, not validated yet; files are looked for beside it."""
+    if path.suffix.lower() in MAPS:
+        raise InputFileError(path, f"is no scenario; a map is run with --map {path}")
     values = read_yaml(path)
     if not isinstance(values, dict):
         raise ConfigError(str(path), "a scenario is a mapping of keys to values")
+    if {"image", "resolution"} <= values.keys():
+        raise InputFileError(path, f"is a map, not a scenario: run it with --map {path}")
     find_user_files(values, path.parent)
     place = values.get("map")
     if isinstance(place, dict) and isinstance(place.get("file"), str):
@@ -101,14 +109,20 @@ def load_scenario(path: Path | str) -> Scenario:
 
 def _first_problem(error: ValidationError, where: str) -> ConfigError:
     """Turn pydantic's first error into ours."""
-    problem = error.errors()[0]
+    problems = error.errors()
+    # A key that is misspelt is why another one is missing.
+    problem = next((one for one in problems if one["type"] == "extra_forbidden"), problems[0])
     loc = tuple(part for part in problem["loc"] if part not in KINDS)
-    place = ".".join(str(p) for p in loc) or "(top)"
+    place = ".".join(str(p) for p in loc)
     message = str(problem["msg"]).removeprefix("Value error, ")
     if problem["type"] == "extra_forbidden":
         message = f"unknown key{nearest_hint(str(loc[-1]), _valid_keys(loc[:-1]))}"
         message += REMEDIES.get(place, "")
-    return ConfigError(f"{where}: {place}", message)
+    elif problem["type"] in ("model_type", "model_attributes_type"):
+        message = f"must be keys with values{LISTS.get(place, '')}, not {problem['input']!r}"
+    elif problem["type"] == "missing":
+        message = "is missing"
+    return ConfigError(f"{where}: {place}" if place else where, message)
 
 
 def _valid_keys(loc: tuple[int | str, ...]) -> list[str]:

@@ -365,7 +365,7 @@ class Scenario(_Strict):
         if sum(p is not None for p in (self.task, self.map, self.place)) != 1:
             raise ValueError("give exactly one of 'task', 'map' and 'place'")
         if isinstance(self.robot, list) and len(self.robot) != self.robots:
-            raise ValueError(f"{len(self.robot)} data sheets in 'robot' for {self.robots} 'robots'")
+            raise ValueError(f"{len(self.robot)} data sheets in 'robot' for {self.robots} 'robots': leave 'robots' out")
         return self
 
     @property

@@ -122,6 +122,8 @@ def _reader_of(path: Path) -> Callable[[Path, Ask], Read]:
     if kind in readers:
         return readers[kind]
     remedy = REMEDIES.get(kind, "")
+    if path.name == "metadata.yaml":
+        remedy = f"; of a rosbag2 name the folder, {path.parent}"
     if path.is_dir():
         raise BadFile("is a folder, and no rosbag2: it has no metadata.yaml")
     raise BadFile(f"scans come as {', '.join((*readers, *BAG_SUFFIXES))}, not '{path.suffix}'{remedy}")

@@ -154,7 +154,9 @@ def _largest_part(raster: Raster) -> Ints:
     found = components(raster)
     label = largest_label(found)
     if label < 0:
-        raise UnsolvableWorldError("the map has no free cell for a robot of this radius")
+        raise UnsolvableWorldError(
+            "the map has no room for such a robot: what is dark, transparent or unknown is not free (docs/maps.md)"
+        )
     rows = np.repeat(np.arange(raster.blocked.shape[0]), np.diff(found.row_first))
     ours = found.label == label
     first, length = found.run_start[ours], (found.run_end - found.run_start)[ours]

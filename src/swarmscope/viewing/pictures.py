@@ -41,10 +41,13 @@ LONG_SIDE_IN = 9.0
 
 CLOSE_RADII = 10.0
 """What is shown round the robots' ways in a picture of only those, radii of a robot."""
+SEAM = 0.6
+"""Width of the lines round pieces of a map [pt]: thinner ones leave light seams between them."""
 PACKET_OPACITY, FEW_PACKETS = 0.55, 150
 """Of the line that stands for a packet; up to so many are drawn alike."""
 
 WAY: dict[str, Any] = {"color": MOVER, "lw": 1.0, "ls": (0, (4, 3)), "zorder": 1}
+DOOR: dict[str, Any] = {"lw": 1.6, "ls": (0, (2, 1.5))}
 MOST_NUMBERS = 60
 """More robots have no numbers in the picture: one could not read them."""
 
@@ -126,7 +129,7 @@ def draw_obstacles(axes: Axes, obstacles: list[Obstacle]) -> None:
     walls = [obstacle.points for obstacle in obstacles if isinstance(obstacle, Wall)]
     axes.add_collection(LineCollection(walls, colors=WALL, linewidths=2.2, capstyle="round"))
     doors = [obstacle.points for obstacle in obstacles if isinstance(obstacle, Door)]
-    axes.add_collection(LineCollection(doors, colors=WALL, linewidths=1.6, linestyles=(0, (2, 1.5))))
+    axes.add_collection(LineCollection(doors, colors=WALL, **DOOR))
 
 
 def _draw_way(axes: Axes, disc: Circle) -> None:
@@ -153,7 +156,7 @@ def _draw_grid(axes: Axes, grid: Grid) -> None:
     low, left, right = side * runs[:, 0], side * runs[:, 1], side * (runs[:, 2] + 1.0)
     corners = np.array([[left, low], [right, low], [right, low + side], [left, low + side]])
     turned = np.array(grid.origin) + corners.transpose(2, 0, 1) @ np.array([[c, s], [-s, c]])
-    axes.add_collection(PolyCollection(list(turned), color=SOLID, lw=0.2))
+    axes.add_collection(PolyCollection(list(turned), color=SOLID, lw=SEAM))
 
 
 def _draw_packets(axes: Axes, run: RunData) -> None:
@@ -206,10 +209,14 @@ def _draw_words(axes: Axes, figure: Any, run: RunData) -> None:
         entries.append(("features sent", "_", 9, PACKET, PACKET))
     if np.any(run.trajectory.collided):
         entries.append(("collision", "X", 8, CRASH, "white"))
+    if any(isinstance(obstacle, Circle) and obstacle.moves for obstacle in run.world.obstacles):
+        entries.append(("moves by itself", "o", 8, MOVER, SOLID_EDGE))
     handles = [
         Line2D([], [], ls="none", label=label, marker=marker, ms=size, mfc=face, mec=edge)
         for label, marker, size, face, edge in entries
     ]
+    if any(isinstance(obstacle, Door) for obstacle in run.world.obstacles):
+        handles.append(Line2D([], [], label="door", color=WALL, **DOOR))
     figure.legend(
         handles=handles,
         loc="lower left",

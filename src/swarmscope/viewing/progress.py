@@ -13,7 +13,16 @@ from swarmscope.judging.run import place_name
 from swarmscope.scenarios.scenario import Scenario
 from swarmscope.user_files import short_name
 
-_shown: list[Progress] = []
+
+class Bar(Progress):
+    """A bar that leaves nothing behind, no empty line either where nobody looks at a terminal."""
+
+    def stop(self) -> None:
+        """Take it off the screen."""
+        self.live.stop()
+
+
+_shown: list[Bar] = []
 QUIET_S = 2.0
 """What takes longer shows how far it is."""
 
@@ -44,7 +53,7 @@ def steps_bar(words: str, after_s: float = QUIET_S) -> Iterator[Callable[[int, i
 def _bar(words: str, total: float | None, after_s: float) -> Iterator[Callable[..., None]]:
     """Show a bar from ``after_s`` on; the body calls what it is given with (done, note) or (done, note, total)."""
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[note]}"), TimeElapsedColumn())
-    bar = Progress(*columns, console=Console(stderr=True), transient=True)
+    bar = Bar(*columns, console=Console(stderr=True), transient=True)
     job = bar.add_task(words, total=total, note="")
     begun = time.monotonic()
 

@@ -15,6 +15,7 @@ import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from swarmscope.errors import InputFileError, SwarmscopeError
+from swarmscope.judging import run_names
 from swarmscope.judging.cases import CHOICE_COLUMNS, OPINION_COLUMNS
 from swarmscope.judging.run_folder import TRAJECTORY, WORLD, read_metrics, read_trajectory, read_world
 from swarmscope.sim.world import Circle, Door, Grid, Length, Number, Obstacle, Point, grid_corners, solid_from_grid
@@ -318,15 +319,9 @@ _KEY_FIGURES: tuple[tuple[str, str, str], ...] = (
 
 
 def headline(run: RunData) -> str:
-    """Return what was run in one line, such as ``T1 · nav-scope · 15 robots · seed 0``."""
+    """Return what was run in one line."""
     about = run.metrics.get("run")
-    about = about if isinstance(about, Mapping) else {}
-    robots = len(run.world.robots)
-    parts = [str(about[key]) for key in ("task", "planner") if about.get(key) is not None]
-    parts.append(f"{robots} robot{'' if robots == 1 else 's'}")
-    if about.get("seed") is not None:
-        parts.append(f"seed {about['seed']}")
-    return " · ".join(parts)
+    return run_names.headline(about if isinstance(about, Mapping) else {}, len(run.world.robots))
 
 
 def summary_rows(run: RunData) -> list[tuple[str, str]]:

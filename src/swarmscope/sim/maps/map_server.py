@@ -17,6 +17,8 @@ from swarmscope.sim.world import Grid, grid_from_solid, solid_from_grid
 from swarmscope.texts import check_regular, read_yaml
 
 YAML = (".yaml", ".yml")
+PLACES = {"task", "map", "place"}
+"""Keys that files of maps do not have, and of which scenarios have one."""
 """Ends of the names of map descriptions; any other file is a picture."""
 FREE_GREY, SOLID_GREY = 254, 0
 
@@ -42,7 +44,7 @@ def load_map(path: str | Path, resolution: float | None = None) -> Grid:
 
 def _picture_alone(path: Path, resolution: float | None) -> Grid:
     if resolution is None:
-        raise ConfigError(f"{path}: resolution", "a picture does not say how large its cells are: give it [m]")
+        raise ConfigError(f"{path}: resolution", "a picture does not say how large its cells are: give their side [m]")
     return as_grid(path, ~free_cells(path, Reading())[::-1], resolution, (0.0, 0.0))
 
 
@@ -94,6 +96,8 @@ def _read_yaml(path: Path) -> dict[str, Any]:
     settings = read_yaml(path)
     if not isinstance(settings, dict):
         raise InputFileError(path, "is not a map description: expected 'key: value' lines")
+    if "image" not in settings and PLACES & settings.keys():
+        raise InputFileError(path, "is a scenario, not a map: run it without --map")
     return settings
 
 

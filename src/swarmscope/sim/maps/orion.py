@@ -33,12 +33,13 @@ def load_maze(path: Path, number: int, resolution: float) -> Maze:
     arrays = read_npz(path)
     numbers, mazes = arrays.get("map"), arrays.get("true")
     if numbers is None or mazes is None:
-        raise InputFileError(path, "is no file of ORION's mazes: it has no 'map' and 'true'")
+        hint = "; worlds of BARN are for 'swarmscope barn'" if "centers_m" in arrays else ""
+        raise InputFileError(path, "is no file of ORION's mazes: it has no 'map' and 'true'" + hint)
     if mazes.dtype != np.uint8 or mazes.ndim != 3 or 0 in mazes.shape or numbers.shape != mazes.shape[:1]:
         raise InputFileError(path, f"'true' is {mazes.dtype} {mazes.shape}; it must be uint8 (mazes, rows, columns)")
     found = np.flatnonzero(numbers == number)
     if not found.size:
-        raise ConfigError("map.number", f"{path} has no maze {number}; it has {numbers.size}, {_some_of(numbers)}")
+        raise ConfigError("map.number", f"{path} has no maze {number}; it has {numbers.size}: {_some_of(numbers)}")
     cells = mazes[found[0]]
     return Maze(as_grid(path, cells[::-1] == WALL, resolution, (0.0, 0.0)), _trips_in(path, cells))
 

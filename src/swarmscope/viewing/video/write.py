@@ -57,7 +57,7 @@ def check_film(path: Path, film: Film) -> None:
     if film.speed is not None and not SLOWEST <= film.speed <= FASTEST:
         raise ConfigError("--speed", f"must be from {SLOWEST:g} to {FASTEST:g}, not {film.speed!r}")
     if path.suffix == ".mp4" and find_spec("av") is None:
-        raise MissingExtraError(f"{path.name} (a .gif does not)", "video")
+        raise MissingExtraError(f"{path}: an .mp4, unlike a .gif,", "video")
 
 
 def write_video(
