@@ -93,3 +93,9 @@ def test_help_has_examples():
     for words in (["experiment", "--help"], ["experiment", "run", "--help"], ["reproduce", "--help"]):
         assert swarmscope(*words).exit_code == 0
     assert "swarmscope reproduce nav-scope --maps 20" in swarmscope("reproduce", "--help").stdout
+
+
+def test_a_folder_called_like_a_shipped_experiment_is_not_taken_for_its_file(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "depository").mkdir()
+    assert "no such store" in refused("experiment", "status", "depository")

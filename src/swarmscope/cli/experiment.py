@@ -129,7 +129,7 @@ def _code_in(experiment: Experiment, allowed: bool) -> list[Path]:
 def load(file: str) -> Experiment:
     """Return the experiment in a file, or the shipped one of that name."""
     path = Path(file)
-    if not path.exists() and (file in shipped_experiments() or path.suffix not in (".yaml", ".yml")):
+    if not path.is_file() and (file in shipped_experiments() or path.suffix not in (".yaml", ".yml")):
         path = shipped_experiment(file)
     return load_experiment(path)
 
