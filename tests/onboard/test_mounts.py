@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from helpers import circles_world
 from swarmscope.errors import ConfigError
 from swarmscope.onboard.body import Body
 from swarmscope.onboard.control.unicycle import ramp
@@ -18,35 +19,57 @@ from swarmscope.sim.contact import static_clearance
 from swarmscope.sim.lidar import cast_static, make_beams
 from swarmscope.sim.world import compile_world
 
-DT, LIMIT_S, STEPS = 0.2, 100.0, 10
+DT, STEPS = 0.2, 10
 
 
-def cross(lidar, seed):
-    """Cross the forest alone; return whether the robot arrives, and its smallest clearance."""
-    setup = make_setup(parse_scenario({"task": {"name": "T1"}, "seed": seed, "robots": 1}, "test"))
-    world, body = compile_world(setup.world), Body()
-    robot = Robot("nav-scope", body, lidar, address=1)
-    robot.warm_up()
-    beams, scan = make_beams(lidar.beams, math.radians(lidar.fov_deg), 5.0), np.empty(lidar.beams, np.float32)
-    (x, y, yaw), (gx, gy) = setup.starts[0], setup.goals[0][:2]
-    speed, moved, least = 0.0, (0.0, 0.0, 0.0), math.inf
-    for now in np.arange(0.0, LIMIT_S, DT):
-        c, s, (mx, my, _) = math.cos(yaw), math.sin(yaw), lidar.mount
-        cast_static(world, x + c * mx - s * my, y + s * mx + c * my, yaw + lidar.mount[2], beams, scan)
-        goal = math.atan2(gy - y, gx - x) - yaw, math.hypot(gx - x, gy - y)
-        command = robot.tick(scan=scan, now_s=now, goal=goal, heading=yaw, speed=speed, moved=moved, scan_s=now)
-        if command.state == "arrived" and speed == 0.0:
-            return True, least
-        x0, y0, yaw0 = x, y, yaw
+class Drive:
+    """A robot in a world, tick after tick; ``spoil`` may change its scans, which are ``late_s`` old."""
+
+    def __init__(self, world, lidar, start, spoil=None, late_s=0.0):
+        self.world, self.lidar, self.spoil, self.late_s = world, lidar, spoil, late_s
+        self.robot = Robot("nav-scope", Body(), lidar, address=1)
+        self.robot.warm_up()
+        self.x, self.y, self.yaw = start
+        self.now_s, self.speed, self.moved, self.least = 0.0, 0.0, (0.0, 0.0, 0.0), math.inf
+        self.beams = make_beams(lidar.beams, math.radians(lidar.fov_deg), lidar.range_m)
+        self.track = [tuple(start)] * (round(late_s / DT * STEPS) + 1)
+
+    def scan(self):
+        (x, y, yaw), (mx, my, turned) = self.track[0], self.lidar.mount
+        c, s, found = math.cos(yaw), math.sin(yaw), np.empty(self.lidar.beams, np.float32)
+        cast_static(self.world, x + c * mx - s * my, y + s * mx + c * my, yaw + turned, self.beams, found)
+        if self.spoil is not None:
+            self.spoil(found)
+        return found
+
+    def tick(self, gx, gy):
+        """Go on towards a goal; return the command."""
+        goal = math.atan2(gy - self.y, gx - self.x) - self.yaw, math.hypot(gx - self.x, gy - self.y)
+        told = {"heading": self.yaw, "speed": self.speed, "moved": self.moved, "scan_s": self.now_s - self.late_s}
+        command = self.robot.tick(scan=self.scan(), now_s=self.now_s, goal=goal, **told)
+        x0, y0, yaw0 = self.x, self.y, self.yaw
         for _ in range(STEPS):
             turn = command.w * DT / STEPS
-            speed, way = ramp(speed, command.v, body.a_max_mps2, DT / STEPS)
-            x1, y1 = x + way * math.cos(yaw + 0.5 * turn), y + way * math.sin(yaw + 0.5 * turn)
-            least = min(least, static_clearance(world, x, y, x1, y1, 1.0) - body.radius_m)
-            x, y, yaw = x1, y1, yaw + turn
-        dx, dy, c, s = x - x0, y - y0, math.cos(yaw0), math.sin(yaw0)
-        moved = c * dx + s * dy, c * dy - s * dx, yaw - yaw0
-    return False, least
+            self.speed, way = ramp(self.speed, command.v, self.robot.body.a_max_mps2, DT / STEPS)
+            x1, y1 = self.x + way * math.cos(self.yaw + 0.5 * turn), self.y + way * math.sin(self.yaw + 0.5 * turn)
+            gap = static_clearance(self.world, self.x, self.y, x1, y1, 1.0) - self.robot.body.radius_m
+            self.least = min(self.least, gap)
+            self.x, self.y, self.yaw = x1, y1, self.yaw + turn
+            self.track = [*self.track[1:], (self.x, self.y, self.yaw)]
+        dx, dy, c, s = self.x - x0, self.y - y0, math.cos(yaw0), math.sin(yaw0)
+        self.moved = c * dx + s * dy, c * dy - s * dx, self.yaw - yaw0
+        self.now_s += DT
+        return command
+
+
+def cross(lidar, seed, limit_s=100.0, **how):
+    """Cross the forest alone; return whether the robot arrives, and its smallest clearance."""
+    setup = make_setup(parse_scenario({"task": {"name": "T1"}, "seed": seed, "robots": 1}, "test"))
+    drive = Drive(compile_world(setup.world), lidar, setup.starts[0], **how)
+    while drive.now_s < limit_s:
+        if drive.tick(*setup.goals[0][:2]).state == "arrived" and drive.speed == 0.0:
+            return True, drive.least
+    return False, drive.least
 
 
 @pytest.mark.parametrize(
@@ -64,6 +87,42 @@ def test_a_lidar_that_sits_off_the_centre_and_looks_ahead_brings_its_robot_acros
     arrived, least = cross(Lidar(beams=int(fov) + 1, fov_deg=fov, mount=mount), 1)
     assert arrived
     assert least > 0.0
+
+
+def break_edges(scan):
+    scan[:15] = scan[-15:] = np.nan
+
+
+@pytest.mark.parametrize(
+    ("fov", "mount", "how"),
+    [
+        (180.0, (0.0, 0.0, 0.0), {"spoil": break_edges, "late_s": 0.1}),
+        (270.0, (0.1, 0.0, 0.0), {"spoil": break_edges}),
+        (330.0, (0.0, 0.0, 0.0), {"late_s": 0.2}),
+        (340.0, (-0.1, 0.05, 0.0), {}),
+        (350.0, (0.0, 0.05, 0.0), {"late_s": 0.1}),
+    ],
+)
+def test_broken_edges_wide_fields_and_late_scans_stop_nobody(fov, mount, how):
+    arrived, least = cross(Lidar(beams=int(fov) + 1, fov_deg=fov, mount=mount), 1, **how)
+    assert arrived
+    assert least > 0.0
+
+
+@pytest.mark.parametrize(
+    ("mount", "how"),
+    [((0.0, 0.0, 0.0), {}), ((0.0, 0.0, 0.0), {"late_s": 0.1}), ((0.05, 0.0, 0.0), {}), ((-0.05, 0.0, 0.0), {})],
+)
+@pytest.mark.parametrize("radius", [0.01, 0.02])
+def test_a_post_in_a_hole_of_the_scan_is_not_touched_wherever_the_scan_was_taken(mount, how, radius):
+    def blind(scan):
+        scan[179:182] = np.nan
+
+    drive = Drive(circles_world([(1.2, 0.0, radius)]), Lidar(mount=mount), (0.0, 0.0, 0.0), blind, **how)
+    for _ in range(40):
+        drive.tick(4.0, 0.0)
+    assert drive.least > 0.0
+    assert drive.x > 0.3  # slowly: behind a hole something narrow may stand
 
 
 def test_the_centre_sees_less_than_a_sensor_before_it():

@@ -17,7 +17,7 @@ from swarmscope.onboard.perception.rays import Rays
 from swarmscope.onboard.perception.reproject import Grid, settle
 from swarmscope.onboard.readings import own_rays, translate
 from swarmscope.onboard.rig import GUARDING, SAFETY, SHARING, Guarding, Rig, Safety, Sharing
-from swarmscope.onboard.sweep import Taken, from_many_places, is_bridged, mended
+from swarmscope.onboard.sweep import Taken, bridged, from_many_places
 from swarmscope.onboard.trail import poses_at, seen_from, then
 from swarmscope.sim.scan_files import ScanLog
 
@@ -126,7 +126,7 @@ def lay_out_scans(log: ScanLog, use: Use, rig: Rig) -> tuple[np.ndarray, Counts]
 def _counted(values: np.ndarray, raw: np.ndarray, own: np.ndarray, layout: Layout, rig: Rig) -> tuple[int, ...]:
     """Return the fields of `Counts` of one scan: ``values (M,)`` as they were, ``raw (M,)`` as they are understood."""
     holes = ~(raw >= least_range(rig))
-    blocks = holes & ~is_bridged(mended(raw, layout, rig, rig.sensor.range_min), rig) if holes.any() else holes
+    blocks = holes & (bridged(np.where(holes, np.nan, raw), layout, rig, rig.sensor.range_min)[1] == 0)
     near = holes & ~own & ((values >= 0.0) | (values == -np.inf))
     broken = holes & ~own & ~near
     inside = ~holes & (raw < rig.body.radius_m)

@@ -61,7 +61,8 @@ class Scans:
         self._centred = lidar.mount[:2] == (0.0, 0.0)
         self.grid = grid_of(self._sheet)
         if not (self._centred or self.grid.rays.closed):
-            self.grid = seen_from_the_centre(self.grid, lidar.mount, core)
+            own = own_rays(self.grid, lidar.masks_deg, lidar.mount[2])
+            self.grid = seen_from_the_centre(self.grid, own, lidar.mount, core)
         angles = self.grid.rays.start + self.grid.rays.increment * np.arange(self.grid.order.size)
         self._wanted = Grid(self.grid.rays, np.cos(angles), np.sin(angles))
         self._header: tuple[float, ...] = ()

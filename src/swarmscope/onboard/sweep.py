@@ -14,7 +14,7 @@ import numpy as np
 from swarmscope.errors import ConfigError
 from swarmscope.geometry import TWO_PI, Pose
 from swarmscope.onboard.lidar import Layout
-from swarmscope.onboard.perception.mend import BRIDGED, body_and_clearance, bridge, mend
+from swarmscope.onboard.perception.mend import bridge
 from swarmscope.onboard.perception.reproject import Grid, Seat, reproject
 from swarmscope.onboard.perception.straighten import straighten
 from swarmscope.onboard.rig import Rig
@@ -41,7 +41,7 @@ def from_one_place(taken: Taken, back: Pose, rig: Rig, wanted: Grid) -> np.ndarr
     x, y, _ = then(back, (*mount[:2], 0.0))
     out = np.empty(wanted.cos.size, np.float32)
     seat = Seat(x, y, back[2], back[0], back[1], _core(rig))
-    reproject(bridged(scan, layout, rig, _blind_m(taken)), layout.rays, seat, wanted, out)
+    reproject(*bridged(scan, layout, rig, _blind_m(taken)), layout.rays, seat, wanted, out)
     return out
 
 
@@ -55,22 +55,22 @@ def from_many_places(taken: Taken, back: np.ndarray, rig: Rig, wanted: Grid) -> 
     x, y = back[:, 0] + c * mount[0] - s * mount[1], back[:, 1] + s * mount[0] + c * mount[1]
     turned = angles - rays.start - rays.increment * np.arange(scan.size)
     out = np.empty(wanted.cos.size, np.float32)
-    seats = np.column_stack([x, y, turned, back[:, 0], back[:, 1]])
-    straighten(bridged(scan, layout, rig, _blind_m(taken)), rays, seats, _core(rig), wanted, out)
+    seats = np.column_stack([x, y, turned, back[:, 0], back[:, 1], np.full(scan.size, _core(rig))])
+    straighten(*bridged(scan, layout, rig, _blind_m(taken)), rays, seats, wanted, out)
     return out
 
 
-def seen_from_the_centre(layout: Layout, mount: Mount, core: float) -> Layout:
+def seen_from_the_centre(layout: Layout, own: np.ndarray, mount: Mount, core: float) -> Layout:
     """Return which rays of a limited field the body's centre would see, its body of radius ``core`` [m] aside.
 
-    A sensor off the centre leaves out what only it can see. Raises ConfigError where straight ahead is not left.
+    A sensor off the centre leaves out what only it can see, and rays in which the robot sees itself, 1 in ``own``.
+    Raises ConfigError where straight ahead is not left.
     """
     rays = layout.rays
     angles = rays.start + rays.increment * np.arange(layout.order.size)
-    out, open_scan = np.empty(angles.size, np.float32), np.full(angles.size, np.inf, np.float32)
-    reproject(
-        open_scan, rays, Seat(*mount[:2], 0.0, 0.0, 0.0, core), Grid(rays, np.cos(angles), np.sin(angles)), out
-    )
+    out, open_scan = np.empty(angles.size, np.float32), np.where(own, np.nan, np.inf).astype(np.float32)
+    seat, grid = Seat(*mount[:2], 0.0, 0.0, 0.0, core), Grid(rays, np.cos(angles), np.sin(angles))
+    reproject(open_scan, np.zeros(angles.size, np.uint8), rays, seat, grid, out)
     seen = np.flatnonzero(~np.isnan(out))
     first, last = (int(seen[0]), int(seen[-1])) if seen.size else (0, 0)
     if not (angles[first] <= 1e-9 and angles[last] >= -1e-9 and last > first):
@@ -84,28 +84,14 @@ def _blind_m(taken: Taken) -> float:
     return taken.least_m + math.hypot(taken.mount[0], taken.mount[1])
 
 
-def bridged(scan: np.ndarray, layout: Layout, rig: Rig, blind_m: float) -> np.ndarray:
-    """Return ``scan (M,)`` with the holes bridged that no body fits into; wider ones stay broken."""
-    holes = np.isnan(scan)
+def bridged(scan: np.ndarray, layout: Layout, rig: Rig, blind_m: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return ``scan (M,)`` with the holes bridged that no body fits into, and which (M,) uint8; wider ones stay NaN."""
+    holes, filled = np.isnan(scan), np.zeros(scan.size, np.uint8)
     if not holes.any():
-        return scan
-    whole = scan.copy()
-    bridge(whole, _along(layout, scan.size, rig, blind_m), np.empty(scan.size, np.uint8))
-    return np.where(holes, whole, scan)
-
-
-def mended(scan: np.ndarray, layout: Layout, rig: Rig, blind_m: float) -> np.ndarray:
-    """Return ``scan (M,)`` along the rays of ``layout`` as ``mend`` leaves it."""
-    whole = scan.copy()
-    mend(whole, _along(layout, scan.size, rig, blind_m), np.empty(scan.size, np.uint8))
-    return whole
-
-
-def _along(layout: Layout, count: int, rig: Rig, blind_m: float) -> Rig:
-    """Return the robot's constants with a sensor whose ``count`` beams are the rays of ``layout``."""
-    rays, sensor = layout.rays, rig.sensor
+        return scan, filled
+    whole, rays, sensor = scan.copy(), layout.rays, rig.sensor
     told = Sensor(
-        beams=count,
+        beams=scan.size,
         angle_min=rays.start,
         increment=rays.increment,
         wraps=rays.closed,
@@ -114,12 +100,8 @@ def _along(layout: Layout, count: int, rig: Rig, blind_m: float) -> Rig:
         range_sigma=sensor.range_sigma,
         position_sigma=sensor.position_sigma,
     )
-    return rig._replace(sensor=told)
-
-
-def is_bridged(whole: np.ndarray, rig: Rig) -> np.ndarray:
-    """Return which holes (M,) were bridged, and do not block."""
-    return np.asarray(whole > np.float32(BRIDGED * body_and_clearance(rig)))
+    bridge(whole, rays.closed, rig._replace(sensor=told), filled)
+    return np.where(holes, whole, scan), filled * holes
 
 
 def _core(rig: Rig) -> float:

@@ -31,7 +31,7 @@ def world_and_seat(seed, away=0.3):
 def moved(scan, seat, rays=CIRCLE, grid=CIRCLE, size=360):
     out = np.empty(size, np.float32)
     angles = grid.start + grid.increment * np.arange(size)
-    reproject(scan, rays, seat, Grid(grid, np.cos(angles), np.sin(angles)), out)
+    reproject(scan, np.zeros(scan.size, np.uint8), rays, seat, Grid(grid, np.cos(angles), np.sin(angles)), out)
     return out
 
 
@@ -121,6 +121,41 @@ def test_what_only_a_sensor_before_us_sees_leaves_no_holes(thing):
     assert (np.diff(seen) == 1).all()
     assert seen[0] == 90 - math.floor(edge)
     assert seen[-1] == 90 + math.floor(edge)
+
+
+@pytest.mark.parametrize("fov", [300, 330, 350])
+@pytest.mark.parametrize("turned", [-1.0, -0.4, 0.4, 1.0])
+def test_of_a_wide_field_that_has_turned_most_is_still_seen(fov, turned):
+    beams = make_beams(fov + 1, math.radians(fov), 5.0)
+    rays = Rays(beams.angle_min, beams.increment, False, 5.0)
+    scan = np.full(fov + 1, np.inf, np.float32)
+    out = moved(scan, Seat(-0.02, 0.0, turned, -0.02, 0.0, CORE), rays, rays, fov + 1)
+    seen, away = np.isinf(out), fov + 1 - math.degrees(abs(turned)) - 4
+    assert seen.sum() >= away
+    assert seen[fov // 2 - 60 : fov // 2 + 60].all()
+
+
+def test_what_was_bridged_is_broken_from_elsewhere_too():
+    scan = np.full(360, 2.0, np.float32)
+    bridged = np.zeros(360, np.uint8)
+    bridged[[180, 270, 271]] = 1
+    out = np.empty(360, np.float32)
+    angles = CIRCLE.start + CIRCLE.increment * np.arange(360)
+    seat = Seat(0.05, 0.0, 0.0, 0.05, 0.0, CORE)
+    reproject(scan, bridged, CIRCLE, seat, Grid(CIRCLE, np.cos(angles), np.sin(angles)), out)
+    broken = np.flatnonzero(np.isnan(out))
+    assert broken.tolist() == [180, 269, 270]
+
+
+def test_broken_edges_of_a_field_are_no_part_of_it():
+    beams = make_beams(181, math.pi, 5.0)
+    rays = Rays(beams.angle_min, beams.increment, False, 5.0)
+    scan = np.full(181, np.inf, np.float32)
+    scan[:10] = scan[-4:] = np.nan
+    out = moved(scan, Seat(0.0, 0.0, 0.0, 0.0, 0.0, CORE), rays, rays, 181)
+    assert np.isnan(out[:10]).all() and np.isnan(out[-4:]).all()
+    assert np.isinf(out[11:-5]).all()
+    assert np.isnan(moved(np.full(181, np.nan, np.float32), Seat(0.1, 0.0, 0.0, 0.0, 0.0, CORE), rays, rays, 181)).all()
 
 
 def test_twice_the_beams_into_a_scan():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from swarmscope._jit import jit, jit_inline, jit_inner
-from swarmscope.onboard.control.way import Way, corner_of
+from swarmscope.onboard.control.way import Way, closer, corner_of
 from swarmscope.onboard.perception.beams import beam_at, nearest_beam
 from swarmscope.onboard.perception.frames import in_view, was_free
 from swarmscope.onboard.reasons import R_HELD_UNSEEN
@@ -33,7 +33,7 @@ def out_of_sight(see: View, way: Way, need: float) -> tuple[float, float]:
             stops = int(math.ceil(length / GRAIN_M))
             for k in range(1, stops + 1):
                 part = k / stops
-                x, y = _unseen_front(see, x0 + part * (x1 - x0), y0 + part * (y1 - y0), fx, fy)
+                x, y = _unseen_front(see, way, x0 + part * (x1 - x0), y0 + part * (y1 - y0), fx, fy)
                 if x != 0.0 or y != 0.0:
                     return x, y
         x0, y0 = x1, y1
@@ -62,23 +62,24 @@ def look_round(see: View, v: float, w: float, why: int) -> tuple[float, float, i
 
 
 @jit_inner
-def _unseen_front(see: View, x: float, y: float, fx: float, fy: float) -> tuple[float, float]:
+def _unseen_front(see: View, way: Way, x: float, y: float, fx: float, fy: float) -> tuple[float, float]:
     """Return a place on the front of the body at (x, y), which looks along f [m], that nobody has seen free."""
     need = math.sqrt(fx * fx + fy * fy)
     places = int(math.ceil(FRONT_RAD * need / GRAIN_M))
     for k in range(-places, places + 1):
         a = k * FRONT_RAD / places
         px, py = x + fx * math.cos(a) - fy * math.sin(a), y + fx * math.sin(a) + fy * math.cos(a)
-        if not (in_view(px, py, see) or was_free(see, px, py) or _is_shut(see, px, py, need)):
+        if not (in_view(px, py, see) or was_free(see, px, py) or _is_shut(see, way, px, py, need)):
             return px, py
     return 0.0, 0.0
 
 
 @jit_inner
-def _is_shut(see: View, px: float, py: float, need: float) -> bool:
-    """Tell whether something is known before (px, py) that is nearer than ``need`` already, and nothing else before it.
+def _is_shut(see: View, way: Way, px: float, py: float, need: float) -> bool:
+    """Tell whether the body never gets to (px, py) for something known before it that is nearer than ``need`` already.
 
-    The guard lets the body come no closer to it (``guard._meets``). What a return is of reaches to the next place.
+    Such a place is needed for clearance alone, and the guard lets the body come no closer to what is known
+    (``guard._meets``). What a return is of reaches to the next place.
     """
     sensor, reach = see.rig.sensor, math.sqrt(px * px + py * py)
     middle = nearest_beam(px, py, 0.0, sensor)
@@ -88,7 +89,4 @@ def _is_shut(see: View, px: float, py: float, need: float) -> bool:
         k = beam_at(n, sensor)
         if k >= 0:
             s = min(s, see.scan[k])
-    if not s < min(reach, need):
-        return False
-    part = (s - 1e-6) / reach
-    return was_free(see, part * px, part * py)
+    return bool(s < min(reach, need) and not closer(px, py, way, see.rig.body.radius_m))

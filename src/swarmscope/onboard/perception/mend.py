@@ -46,27 +46,37 @@ def mend(ranges: np.ndarray, rig: Rig, broken: np.ndarray) -> int:
         broken[n] = not ranges[n] >= least
         count += broken[n]
     if count > 0:
-        _bridge(ranges, rig, least)
+        _bridge(ranges, rig, rig.sensor.wraps)
     return count
 
 
 @jit
-def bridge(ranges: np.ndarray, rig: Rig, broken: np.ndarray) -> None:
-    """Replace broken readings as ``mend`` does where no body fits into the hole; where it blocks they become NaN."""
-    if mend(ranges, rig, broken) == 0:
+def bridge(ranges: np.ndarray, closed: bool, rig: Rig, bridged: np.ndarray) -> None:
+    """Replace broken readings as ``mend`` does where no body fits into the hole; where it blocks they become NaN.
+
+    ``ranges (B,)`` [m] go round a circle only if it is ``closed``; ``bridged (B,)`` uint8 becomes 1 for what was
+    replaced by a range.
+    """
+    least, count = least_range(rig), 0
+    for n in range(ranges.size):
+        bridged[n] = not ranges[n] >= least
+        count += bridged[n]
+    if count == 0:
         return
+    _bridge(ranges, rig, closed)
     blocks = np.float32(BRIDGED * body_and_clearance(rig))
     for n in range(ranges.size):
-        if broken[n] and not ranges[n] > blocks:
+        if bridged[n] and not ranges[n] > blocks:
             ranges[n] = np.nan
+            bridged[n] = 0
 
 
 @jit_inner
-def _bridge(ranges: np.ndarray, rig: Rig, least: float) -> None:
+def _bridge(ranges: np.ndarray, rig: Rig, wraps: bool) -> None:
     """Bridge every run of broken readings."""
-    total = ranges.size
+    total, least = ranges.size, least_range(rig)
     first = 0
-    if rig.sensor.wraps:
+    if wraps:
         while first < total and not ranges[first] >= least:
             first += 1
         if first == total:
@@ -79,23 +89,22 @@ def _bridge(ranges: np.ndarray, rig: Rig, least: float) -> None:
         stop = k
         while stop < first + total and not ranges[stop % total] >= least:
             stop += 1
-        s = _behind(ranges, k, stop, rig)
+        s = _behind(ranges, k, stop, rig, wraps)
         for n in range(k, stop):
             ranges[n % total] = s
         k = stop
 
 
 @jit_inner
-def _behind(ranges: np.ndarray, k: int, stop: int, rig: Rig) -> float:
+def _behind(ranges: np.ndarray, k: int, stop: int, rig: Rig, wraps: bool) -> float:
     """Return the range that stands for the broken run of beams k .. stop - 1."""
     total = ranges.size
     touching = body_and_clearance(rig)
-    closed = rig.sensor.wraps and stop - k < total
+    closed = wraps and stop - k < total
     if not closed and (k == 0 or stop == total):
         return touching
     width = (stop - k + 1) * rig.sensor.increment
-    thinnest = rig.guarding.thinnest_m
-    if width >= math.pi or (rig.sensor.range_min > touching and 0.0 < thinnest < width * rig.sensor.range_min):
+    if width >= math.pi or (rig.sensor.range_min > touching and width * rig.sensor.range_min > rig.guarding.thinnest_m):
         return touching  # beyond the body something may stand too near to be measured
     fits = rig.guarding.others_smallest_m / math.sin(0.5 * width) - rig.guarding.others_smallest_m
     beside = min(float(ranges[(k - 1) % total]), float(ranges[stop % total]))

@@ -3,7 +3,7 @@
 What a scan knows is the area between the sensor and its readings. Its border is what a robot elsewhere sees: the
 returns, joined ray by ray (between a near and a far one lies the edge of a shadow, and nobody knows what is in it), and
 walls along broken rays. Directions in which no border is seen are broken (NaN), and so are those that cross the edge of
-a limited field before one: nobody has looked there.
+a limited field before one: nobody has looked there. Holes that were bridged are holes from elsewhere, too.
 """
 
 from __future__ import annotations
@@ -23,6 +23,10 @@ ON_BORDER = math.pi - 0.01
 """Seen under a larger angle than this [rad], a piece of border passes through where we are."""
 
 
+UNSEEN = np.float32(-1.0)
+"""Marks a direction in which nobody has looked from here on."""
+NEARER = 0.98
+"""What is nearer than this share of a hole's border hides the hole."""
 NEAR_M, NEAR_STEPS = 0.002, 0.25
 """A scan taken this close by [m], turned by this share of an increment, is used as it is."""
 
@@ -73,16 +77,19 @@ def move_on(see: View) -> None:
 
 @jit
 def _see_from_here(see: View) -> None:
-    """Make ``see.scan`` what is seen from where the robot is now."""
-    percept, sensor = see.percept, see.rig.sensor
+    """Make ``see.scan`` what is seen from where the robot is now; out of a limited view nothing was measured."""
+    percept, rig, sensor = see.percept, see.rig, see.rig.sensor
+    first, closed = sensor.first, sensor.wraps and sensor.field == 0
+    count = sensor.field if sensor.field > 0 else sensor.beams
+    taken, bridged, here = see.filtered[:count], see.safe[:count], see.scan[first : first + count]
+    for n in range(count):
+        taken[n] = here[n]
+    bridge(taken, closed, rig, bridged)
+    rays = Rays(sensor.angle_min + first * sensor.increment, sensor.increment, closed, sensor.range_max)
     x, y, yaw = percept["scan_x"], percept["scan_y"], percept["scan_yaw"]
-    for n in range(sensor.beams):  # out of a limited view nothing was measured
-        measured = sensor.field == 0 or sensor.first <= n < sensor.first + sensor.field
-        see.filtered[n] = see.scan[n] if measured else math.inf
-    bridge(see.filtered, see.rig, see.safe)
-    rays = Rays(sensor.angle_min, sensor.increment, sensor.wraps, sensor.range_max)
-    seat = Seat(x, y, yaw, x, y, see.rig.body.radius_m + see.rig.guarding.clearance_m)
-    reproject(see.filtered, rays, seat, Grid(rays, see.rig.cos, see.rig.sin), see.scan)
+    seat = Seat(x, y, yaw, x, y, rig.body.radius_m + rig.guarding.clearance_m)
+    grid = Grid(rays, rig.cos[first : first + count], rig.sin[first : first + count])
+    reproject(taken, bridged, rays, seat, grid, here)
 
 
 @jit
@@ -103,39 +110,58 @@ def settle(raw: np.ndarray, order: np.ndarray, least: float, most: float, out: n
 
 
 @jit
-def reproject(scan: np.ndarray, rays: Rays, seat: Seat, grid: Grid, out: np.ndarray) -> None:
+def reproject(scan: np.ndarray, bridged: np.ndarray, rays: Rays, seat: Seat, grid: Grid, out: np.ndarray) -> None:
     """Write ``scan (B,)``, taken from ``seat`` along ``rays``, into ``out (M,)`` along ``grid`` round where we are.
 
-    Both are float32 [m], +inf for no return, NaN for broken readings.
+    Both are float32 [m], +inf for no return, NaN for broken readings. A limited field ends with its outermost sound
+    rays. What looks where ``bridged (B,)`` is 1 is broken again: something narrow may stand there.
     """
     for n in range(out.size):
         out[n] = np.nan
-    total = scan.size
-    first = before = _end(scan[0], 0, rays, seat)
-    for k in range(total):
+    first, last = sound_part(scan, rays.closed)
+    if last < first:
+        return
+    begin = before = _end(scan[first], first, rays, seat)
+    for k in range(first, last + 1):
         end = _end(scan[k], k, rays, seat)
-        if k > 0:
+        if k > first:
             _join(scan[k - 1], scan[k], before, end, grid, out)
-        if _beside_unknown(scan, k, rays.closed):
+        if _beside_unknown(scan, k):
             _wall(rays.start + seat.yaw + k * rays.increment, rays.reach, seat, grid, out)
         if scan[k] < np.inf:
             _dot(end, grid, out)
         before = end
     if rays.closed:
-        _join(scan[total - 1], scan[0], before, first, grid, out)
-        return
-    first_angle = rays.start + seat.yaw
-    _leave_out(True, first_angle, seat, grid, out)
-    _leave_out(False, first_angle + (total - 1) * rays.increment, seat, grid, out)
+        _join(scan[last], scan[first], before, begin, grid, out)
+    else:
+        _leave_out(rays.start + seat.yaw + first * rays.increment, seat, grid, out)
+        _leave_out(rays.start + seat.yaw + last * rays.increment, seat, grid, out)
+        _end_view(grid, out)
+    for k in range(first, last + 1):
+        if bridged[k]:
+            left, right = k + 1 if k + 1 < scan.size else 0, k - 1 if k > 0 else scan.size - 1
+            a, b = _end(scan[right], right, rays, seat), _end(scan[left], left, rays, seat)
+            _break(a, _end(scan[k], k, rays, seat), b, grid, out)
+
+
+@jit_inline
+def sound_part(scan: np.ndarray, closed: bool) -> tuple[int, int]:
+    """Return the first and the last ray of a field, broken ones at its edges left out; all of a circle."""
+    first, last = 0, scan.size - 1
+    if closed:
+        return first, last
+    while first <= last and not scan[first] >= 0.0:
+        first += 1
+    while last >= first and not scan[last] >= 0.0:
+        last -= 1
+    return first, last
 
 
 @jit_inner
-def _beside_unknown(scan: np.ndarray, k: int, closed: bool) -> bool:
+def _beside_unknown(scan: np.ndarray, k: int) -> bool:
     """Tell whether ray k is the edge of a run of broken rays."""
-    total = scan.size
-    before, after = scan[k - 1 if k > 0 else total - 1], scan[k + 1 if k + 1 < total else 0]
-    before_is_sound, after_is_sound = before >= 0.0 and (closed or k > 0), after >= 0.0 and (closed or k + 1 < total)
-    return not scan[k] >= 0.0 and (before_is_sound or after_is_sound)
+    before, after = scan[k - 1 if k > 0 else scan.size - 1], scan[k + 1 if k + 1 < scan.size else 0]
+    return not scan[k] >= 0.0 and (before >= 0.0 or after >= 0.0)
 
 
 @jit_inner
@@ -163,20 +189,48 @@ def _wall(angle: float, reach: float, seat: Seat, grid: Grid, out: np.ndarray) -
 
 
 @jit_inner
-def _leave_out(right: bool, angle: float, seat: Seat, grid: Grid, out: np.ndarray) -> None:
-    """Make directions unknown that cross the ray at ``angle``, an edge of the field, before they meet a border.
-
-    With them goes whatever lies farther out on that side: what is left is a field without holes.
-    """
+def _leave_out(angle: float, seat: Seat, grid: Grid, out: np.ndarray) -> None:
+    """Mark every direction that crosses the ray at ``angle``, an edge of the field, before it meets a border."""
     a, b = _outside(angle, grid.rays.reach, seat)
     low, high = _between(a, b, grid, out.size)
-    inner = -1 if right else out.size
-    for n in range(max(low, 0), min(high, out.size - 1) + 1):
-        s = ray_segment(grid.cos[n], grid.sin[n], a.x, a.y, b.x, b.y)
-        if s < np.inf and not out[n] <= s:
-            inner = max(inner, n) if right else min(inner, n)
-    for n in range(inner + 1 if right else out.size - inner):
-        out[n if right else inner + n] = np.nan
+    turn = int(math.floor(2.0 * math.pi / grid.rays.increment + 0.5))
+    for k in range(low, high + 1):
+        n = k if k < out.size else k - turn  # it may go on at the other end of a wide field
+        n = n if n >= 0 else n + turn
+        if 0 <= n < out.size:
+            s = ray_segment(grid.cos[n], grid.sin[n], a.x, a.y, b.x, b.y)
+            if s < np.inf and not out[n] <= s:
+                out[n] = UNSEEN
+
+
+@jit_inner
+def _end_view(grid: Grid, out: np.ndarray) -> None:
+    """Make unknown, on either side of straight ahead, all from the first direction on that was left out."""
+    ahead = min(out.size - 1, max(0, int(math.floor(_offset(0.0, grid) + 0.5))))
+    for step in (1, -1):
+        unknown, n = False, ahead
+        while 0 <= n < out.size:
+            unknown |= out[n] == UNSEEN
+            if unknown:
+                out[n] = np.nan
+            n += step
+
+
+@jit_inner
+def _break(a: End, middle: End, b: End, grid: Grid, out: np.ndarray) -> None:
+    """Make the directions nearer to ``middle`` than to a and b, about, broken where they show nothing nearer."""
+    width, nearest = wrap_angle(b.bearing - a.bearing), math.inf
+    start = _offset(a.bearing if width >= 0.0 else b.bearing, grid)
+    low = int(math.ceil(start + 0.5 - 1e-6))
+    high = int(math.floor(start + abs(width) / grid.rays.increment - 0.5 + 1e-6))
+    for end in (a, middle, b):
+        nearest = min(nearest, math.sqrt(end.x * end.x + end.y * end.y))
+    if low > high:  # it lies between two directions
+        low = high = int(math.floor(_offset(middle.bearing, grid) + 0.5))
+    for k in range(low, high + 1):
+        n = k % out.size if grid.rays.closed else k
+        if 0 <= n < out.size and out[n] >= NEARER * nearest:
+            out[n] = np.nan
 
 
 @jit_inner

@@ -15,11 +15,14 @@ from swarmscope.onboard.perception.reproject import (  # the same border, drawn 
     Grid,
     Seat,
     _beside_unknown,
+    _break,
     _dot,
     _end,
+    _end_view,
     _join,
     _leave_out,
     _wall,
+    sound_part,
 )
 
 ON_LINE_M = 0.005
@@ -27,37 +30,53 @@ ON_LINE_M = 0.005
 
 
 @jit
-def straighten(scan: np.ndarray, rays: Rays, seats: np.ndarray, core: float, grid: Grid, out: np.ndarray) -> None:
+def straighten(
+    scan: np.ndarray, bridged: np.ndarray, rays: Rays, seats: np.ndarray, grid: Grid, out: np.ndarray
+) -> None:
     """Write ``scan (B,)`` into ``out (M,)`` along ``grid`` round where we are; ray k was taken from ``seats[k]``.
 
-    ``seats (B, 5)`` holds the fields of a Seat but the last, ``core``; yaw is by how much the ray is turned. Ranges are
-    float32 [m], +inf for no return, NaN for broken ones.
+    ``seats (B, 6)`` holds the fields of a Seat each; yaw is by how much the ray is turned. Ranges are
+    float32 [m], +inf for no return, NaN for broken ones, ``bridged (B,)`` 1 where a hole was bridged.
     """
     for n in range(out.size):
         out[n] = np.nan
-    total = scan.size
-    before = _end(scan[total - 1], total - 1, rays, _seat(seats, total - 1, core))
-    for k in range(total):
-        seat = _seat(seats, k, core)
+    first, last = sound_part(scan, rays.closed)
+    if last < first:
+        return
+    before = _end(scan[last], last, rays, _seat(seats, last))
+    for k in range(first, last + 1):
+        seat = _seat(seats, k)
         end = _end(scan[k], k, rays, seat)
-        if (k > 0 or rays.closed) and _is_next(seats, k, rays):
-            _join(scan[k - 1 if k > 0 else total - 1], scan[k], before, end, grid, out)
-        if _beside_unknown(scan, k, rays.closed):
+        if (k > first or rays.closed) and _is_next(seats, k, rays):
+            _join(scan[k - 1 if k > 0 else last], scan[k], before, end, grid, out)
+        if _beside_unknown(scan, k):
             _wall(rays.start + seat.yaw + k * rays.increment, rays.reach, seat, grid, out)
-        if scan[k] < np.inf and not _is_in_line(scan, k, rays, seats, core):
+        if scan[k] < np.inf and not _is_in_line(scan, k, rays, seats):
             _dot(end, grid, out)
         before = end
-    if rays.closed:
-        return
-    right, left = _seat(seats, 0, core), _seat(seats, total - 1, core)  # the outermost rays themselves were free
-    _leave_out(True, rays.start + right.yaw - rays.increment, right, grid, out)
-    _leave_out(False, rays.start + left.yaw + total * rays.increment, left, grid, out)
+    if not rays.closed:
+        for k in (first, last):
+            seat = _seat(seats, k)
+            _leave_out(rays.start + seat.yaw + k * rays.increment, seat, grid, out)
+        _end_view(grid, out)
+    for k in range(first, last + 1):
+        if bridged[k]:
+            _break_at(scan, k, rays, seats, grid, out)
 
 
 @jit_inner
-def _seat(seats: np.ndarray, k: int, core: float) -> Seat:
+def _break_at(scan: np.ndarray, k: int, rays: Rays, seats: np.ndarray, grid: Grid, out: np.ndarray) -> None:
+    """Make broken again what looks where ray k was bridged."""
+    right, left = k - 1 if k > 0 else scan.size - 1, k + 1 if k + 1 < scan.size else 0
+    a = _end(scan[right], right, rays, _seat(seats, right))
+    b = _end(scan[left], left, rays, _seat(seats, left))
+    _break(a, _end(scan[k], k, rays, _seat(seats, k)), b, grid, out)
+
+
+@jit_inner
+def _seat(seats: np.ndarray, k: int) -> Seat:
     """Return where ray k was taken."""
-    return Seat(seats[k, 0], seats[k, 1], seats[k, 2], seats[k, 3], seats[k, 4], core)
+    return Seat(seats[k, 0], seats[k, 1], seats[k, 2], seats[k, 3], seats[k, 4], seats[k, 5])
 
 
 @jit_inner
@@ -70,7 +89,7 @@ def _is_next(seats: np.ndarray, k: int, rays: Rays) -> bool:
 
 
 @jit_inner
-def _is_in_line(scan: np.ndarray, k: int, rays: Rays, seats: np.ndarray, core: float) -> bool:
+def _is_in_line(scan: np.ndarray, k: int, rays: Rays, seats: np.ndarray) -> bool:
     """Tell whether the return of ray k lies between those of its neighbours, on the line that joins them."""
     total = scan.size
     if not rays.closed and k in (0, total - 1):
@@ -78,9 +97,9 @@ def _is_in_line(scan: np.ndarray, k: int, rays: Rays, seats: np.ndarray, core: f
     i, j = k - 1 if k > 0 else total - 1, k + 1 if k + 1 < total else 0
     if not (scan[i] < np.inf and scan[j] < np.inf):
         return False
-    a = _end(scan[i], i, rays, _seat(seats, i, core))
-    b = _end(scan[k], k, rays, _seat(seats, k, core))
-    c = _end(scan[j], j, rays, _seat(seats, j, core))
+    a = _end(scan[i], i, rays, _seat(seats, i))
+    b = _end(scan[k], k, rays, _seat(seats, k))
+    c = _end(scan[j], j, rays, _seat(seats, j))
     ux, uy, vx, vy = c.x - a.x, c.y - a.y, b.x - a.x, b.y - a.y
     length2, along, across = ux * ux + uy * uy, ux * vx + uy * vy, ux * vy - uy * vx
     return bool(0.0 < along < length2 and across * across < ON_LINE_M * ON_LINE_M * length2)
