@@ -294,7 +294,8 @@ def _checked_ranges(raw: npt.NDArray[np.float64], range_max: float) -> npt.NDArr
     if np.isnan(raw).all():
         raise BadFile("holds no valid reading, only NaN")
     beyond = raw > range_max * (1.0 + 1e-6)
-    return np.where(beyond, np.inf, raw).astype(np.float32)
+    with np.errstate(over="ignore"):  # farther than float32 can say is no return
+        return np.where(beyond, np.inf, raw).astype(np.float32)
 
 
 def _optional(

@@ -158,6 +158,14 @@ def test_broken_edges_of_a_field_are_no_part_of_it():
     assert np.isnan(moved(np.full(181, np.nan, np.float32), Seat(0.1, 0.0, 0.0, 0.0, 0.0, CORE), rays, rays, 181)).all()
 
 
+def test_who_cannot_see_straight_ahead_from_here_sees_nothing():
+    beams = make_beams(61, math.radians(60.0), 5.0)
+    rays = Rays(beams.angle_min, beams.increment, False, 5.0)
+    scan = np.full(61, np.inf, np.float32)
+    for side in (0.14, -0.14):
+        assert np.isnan(moved(scan, Seat(0.0, side, 0.0, 0.0, 0.0, CORE), rays, rays, 61)).all()
+
+
 def test_twice_the_beams_into_a_scan():
     sensor = make_sensor(720)
     world, _ = world_and_seat(5)

@@ -207,8 +207,9 @@ def _leave_out(angle: float, seat: Seat, grid: Grid, out: np.ndarray) -> None:
 def _end_view(grid: Grid, out: np.ndarray) -> None:
     """Make unknown, on either side of straight ahead, all from the first direction on that was left out."""
     ahead = min(out.size - 1, max(0, int(math.floor(_offset(0.0, grid) + 0.5))))
+    blind_ahead = out[ahead] == UNSEEN
     for step in (1, -1):
-        unknown, n = False, ahead
+        unknown, n = blind_ahead, ahead
         while 0 <= n < out.size:
             unknown |= out[n] == UNSEEN
             if unknown:
