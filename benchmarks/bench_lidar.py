@@ -13,8 +13,9 @@ import numba
 import numpy as np
 
 from swarmscope.geometry import ray_circle
+from swarmscope.sim.beams import Beams, make_beams
 from swarmscope.sim.contact import static_clearance
-from swarmscope.sim.lidar import Beams, cast_static, make_beams
+from swarmscope.sim.lidar import cast_static
 from swarmscope.sim.maps import load_map, packaged_map
 from swarmscope.sim.world import Circle, World, WorldSpec, compile_world
 

@@ -19,7 +19,8 @@ from swarmscope.onboard.view import Swarm, new_swarm
 from swarmscope.scenarios.places import make_setup
 from swarmscope.scenarios.read import parse_scenario
 from swarmscope.scenarios.to_kernels import make_rig_of
-from swarmscope.sim.lidar import cast_static, make_beams
+from swarmscope.sim.beams import make_beams
+from swarmscope.sim.lidar import cast_static
 from swarmscope.sim.world import compile_world
 
 ROBOTS = 64

@@ -28,7 +28,8 @@ from swarmscope.onboard.rig import AHEAD, PRINTED, Rig
 from swarmscope.scenarios.places import make_setup
 from swarmscope.scenarios.read import parse_scenario
 from swarmscope.scenarios.to_kernels import make_rig_of
-from swarmscope.sim.lidar import cast_static, make_beams
+from swarmscope.sim.beams import make_beams
+from swarmscope.sim.lidar import cast_static
 from swarmscope.sim.world import compile_world
 
 mpl.use("Agg")

@@ -12,7 +12,8 @@ import numpy as np
 from swarmscope.onboard.body import Body
 from swarmscope.onboard.lidar import Lidar
 from swarmscope.onboard.robot import Command, Robot, Seen
-from swarmscope.sim.lidar import cast_disc, cast_static, make_beams
+from swarmscope.sim.beams import make_beams
+from swarmscope.sim.lidar import cast_disc, cast_static
 from swarmscope.sim.world import Circle, WorldSpec, compile_world
 
 DT = 0.2

@@ -12,7 +12,8 @@ from swarmscope.onboard.planners import load_planner
 from swarmscope.onboard.rig import Guarding, Safety, Sharing, make_rig
 from swarmscope.onboard.rows import Rows
 from swarmscope.onboard.sensor import Sensor
-from swarmscope.sim.lidar import cast_static, make_beams
+from swarmscope.sim.beams import make_beams
+from swarmscope.sim.lidar import cast_static
 from swarmscope.sim.state import Clock, Conditions, Faults, Noise, Radio, Start, new_sim
 from swarmscope.sim.world import Circle, WorldSpec, compile_world
 

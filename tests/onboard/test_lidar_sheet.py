@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from swarmscope.errors import ConfigError
 from swarmscope.onboard.lidar import Lidar, check_lidar, grid_of, lay_out, layout_of, sensor_of
 from swarmscope.onboard.sensor import all_round
-from swarmscope.sim.lidar import make_beams
+from swarmscope.sim.beams import make_beams
 
 
 def directions(lidar):

@@ -15,8 +15,9 @@ from swarmscope.onboard.lidar import Lidar
 from swarmscope.onboard.robot import Robot
 from swarmscope.scenarios.places import make_setup
 from swarmscope.scenarios.read import parse_scenario
+from swarmscope.sim.beams import make_beams
 from swarmscope.sim.contact import static_clearance
-from swarmscope.sim.lidar import cast_static, make_beams
+from swarmscope.sim.lidar import cast_static
 from swarmscope.sim.world import compile_world
 
 DT, STEPS = 0.2, 10

@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 
 from swarmscope.errors import ConfigError
 from swarmscope.geometry import rough_angle
+from swarmscope.sim.beams import make_beams
 from swarmscope.sim.contact import static_clearance
-from swarmscope.sim.lidar import ANGLE_SLACK, cast_disc, cast_static, make_beams
+from swarmscope.sim.lidar import ANGLE_SLACK, cast_disc, cast_static
 from swarmscope.sim.maps import load_map, packaged_map
 from swarmscope.sim.world import WALL_M, Circle, Polygon, Wall, WorldSpec, compile_world, grid_from_solid
 

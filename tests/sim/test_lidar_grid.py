@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from swarmscope.sim import slabs
-from swarmscope.sim.lidar import cast_static, make_beams
+from swarmscope.sim.beams import make_beams
+from swarmscope.sim.lidar import cast_static
 from swarmscope.sim.lidar_grid import FEW_BEAMS
 from swarmscope.sim.world import Circle, WorldSpec, compile_world, grid_from_solid, in_grid
 

@@ -7,8 +7,9 @@ import math
 import numpy as np
 import pytest
 
+from swarmscope.sim.beams import make_beams
 from swarmscope.sim.contact import static_clearance
-from swarmscope.sim.lidar import cast_static, make_beams
+from swarmscope.sim.lidar import cast_static
 from swarmscope.sim.world import WALL_M, Circle, Polygon, Wall, WorldSpec, compile_world
 
 mujoco = pytest.importorskip(

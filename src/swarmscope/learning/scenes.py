@@ -33,7 +33,7 @@ from swarmscope.onboard.view import Swarm
 from swarmscope.scenarios.read import parse_scenario
 from swarmscope.scenarios.scenario import Scenario
 from swarmscope.scenarios.to_kernels import make_rig_of, make_setting
-from swarmscope.sim.lidar import Beams, make_beams
+from swarmscope.sim.beams import Beams, make_beams
 from swarmscope.sim.loop import run
 from swarmscope.sim.world import World, compile_world
 from swarmscope.tasks import Setup

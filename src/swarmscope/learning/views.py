@@ -14,7 +14,8 @@ from swarmscope.onboard.network.local_map import encode_scan, hide_robot
 from swarmscope.onboard.perception.safety import beam_of, safe_directions
 from swarmscope.onboard.rig import PRINTED, Rig
 from swarmscope.onboard.sensor import Sensor
-from swarmscope.sim.lidar import Beams, cast_disc, cast_static
+from swarmscope.sim.beams import Beams
+from swarmscope.sim.lidar import cast_disc, cast_static
 from swarmscope.sim.sensing import SIGHT_SLACK
 from swarmscope.sim.world import World
 

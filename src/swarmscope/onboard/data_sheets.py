@@ -9,7 +9,7 @@ from typing import Any
 from swarmscope.errors import ConfigError, UnknownNameError
 from swarmscope.onboard.body import Body, protection_model
 from swarmscope.onboard.edge import ADDRESSES, short
-from swarmscope.onboard.lidar import Lidar, finite, sensor_of, sweep_s
+from swarmscope.onboard.lidar import LEAST_VIEW_DEG, Lidar, finite, sensor_of, sweep_s
 from swarmscope.onboard.planners import Planner, load_planner
 from swarmscope.onboard.rig import GUARDING, SAFETY, SHARING, Guarding, Rig, Safety, Sharing, make_rig
 from swarmscope.onboard.scans import Scans
@@ -110,8 +110,6 @@ def _part(kind: Any, options: Mapping[str, Any]) -> Any:
     return kind(**{name: options[name] for name in kind._fields})
 
 
-LEAST_VIEW_DEG = 30.0
-"""What stands beside a robot has been ahead of it before; with a narrower view than this many do not get on."""
 SLOWEST_MPS = 0.1
 """A robot that may not be as fast as this, for what it sees, can hardly move."""
 

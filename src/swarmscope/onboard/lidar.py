@@ -13,6 +13,8 @@ from swarmscope.onboard.perception.rays import Rays
 from swarmscope.onboard.sensor import Sensor
 
 FEWEST_BEAMS, MOST_BEAMS = 8, 4096
+LEAST_VIEW_DEG = 30.0
+"""What stands beside a robot has been ahead of it before; with a narrower view than this many do not get on."""
 LONGEST_M = 1000.0
 FINEST_RAD = math.radians(0.01)
 """Readings lie at least this far apart [rad]."""

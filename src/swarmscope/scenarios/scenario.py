@@ -13,7 +13,7 @@ from typing import Annotated, Any, Final, Literal, Self
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag, model_validator
 
 from swarmscope.onboard.body import Body
-from swarmscope.onboard.lidar import Lidar
+from swarmscope.onboard.lidar import LEAST_VIEW_DEG, Lidar
 from swarmscope.onboard.rig import Guarding, Safety, Sharing
 from swarmscope.sim.loop import Setting
 from swarmscope.sim.state import Faults, Noise, Radio
@@ -124,7 +124,7 @@ class LidarModel(_Strict):
 
     beams: Annotated[int, Field(ge=8, le=4096), NUMBER] = LIDAR.beams
     """Beams of a scan."""
-    fov_deg: Annotated[float, Field(ge=30.0, le=360.0), NUMBER] = LIDAR.fov_deg
+    fov_deg: Annotated[float, Field(ge=LEAST_VIEW_DEG, le=360.0), NUMBER] = LIDAR.fov_deg
     """Field of view, in the middle of which is straight ahead [°]."""
     range_m: Annotated[float, Field(ge=0.01, le=1000.0), NUMBER] = LIDAR.range_m
     """Longest range; beyond it there is no return [m]."""

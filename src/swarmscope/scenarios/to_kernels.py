@@ -16,7 +16,7 @@ from swarmscope.onboard.rig import Guarding, Rig, Safety, Sharing, make_rig
 from swarmscope.onboard.sensor import Sensor, all_round
 from swarmscope.scenarios.places import is_packaged, map_path
 from swarmscope.scenarios.scenario import GuardModel, NoiseModel, PlannerModel, RobotModel, Scenario
-from swarmscope.sim.lidar import make_beams
+from swarmscope.sim.beams import make_beams
 from swarmscope.sim.loop import Setting
 from swarmscope.sim.moving import STANDSTILL, Moving, moving_in, top_speed
 from swarmscope.sim.state import Faults, Noise, Radio

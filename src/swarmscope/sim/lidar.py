@@ -9,18 +9,11 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-import numpy.typing as npt
-
 from swarmscope._jit import jit, jit_inline
 from swarmscope.geometry import rough_angle
-from swarmscope.sim.beams import Beams, Ranges, make_beams
+from swarmscope.sim.beams import Beams, Ranges
 from swarmscope.sim.lidar_grid import cast_grid
 from swarmscope.sim.world import PIECE_M, World, bin_index, bin_run
-
-__all__ = ["ANGLE_SLACK", "Beams", "Bytes", "Ranges", "cast_disc", "cast_segment", "cast_static", "make_beams"]
-
-Bytes = npt.NDArray[np.uint8]
 
 ANGLE_SLACK = 5e-4
 """Added to each side of an obstacle's angular interval [rad]; larger than the error of `rough_angle`."""

@@ -16,16 +16,12 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from swarmscope._jit import jit, jit_inline
 from swarmscope.geometry import ROUGH, rough_angle
 from swarmscope.sim.beams import Beams, Ranges
-from swarmscope.sim.slabs import ABOVE, BELOW, BOTTOM, LEFT, RIGHT, TOP, Slabs, slab_at
+from swarmscope.sim.slabs import ABOVE, BELOW, BOTTOM, LEFT, RIGHT, TOP, Bytes, Indices, Slabs, slab_at
 from swarmscope.sim.world import World, bin_index, in_grid
-
-Bytes = npt.NDArray[np.uint8]
-Indices = npt.NDArray[np.int32]
 
 SLACK = 4.0 * ROUGH
 """Beams nearer than this to a corner [rad] are compared with it exactly."""

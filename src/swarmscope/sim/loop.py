@@ -20,9 +20,9 @@ from swarmscope.onboard.reasons import CRASHED, R_COLLIDED
 from swarmscope.onboard.rig import Rig
 from swarmscope.onboard.view import Swarm, arrays_of
 from swarmscope.sim.advice import Advice, tell_sides
+from swarmscope.sim.beams import Beams
 from swarmscope.sim.cells import index_robots
 from swarmscope.sim.faults import blanks, forget, strike
-from swarmscope.sim.lidar import Beams
 from swarmscope.sim.motion import judge, move
 from swarmscope.sim.moving import STANDSTILL, Moving, write_places
 from swarmscope.sim.radio import exchange

@@ -10,8 +10,9 @@ import numpy as np
 
 from swarmscope._jit import jit, jit_inline
 from swarmscope.geometry import point_segment_distance
-from swarmscope.sim.lidar import Beams, Bytes, Ranges, cast_disc, cast_segment
-from swarmscope.sim.world import WALL_M, Circle, Door, Floats, Ints, WorldSpec
+from swarmscope.sim.beams import Beams, Ranges
+from swarmscope.sim.lidar import cast_disc, cast_segment
+from swarmscope.sim.world import WALL_M, Bytes, Circle, Door, Floats, Ints, WorldSpec
 
 INSIDE = np.float32(0.0)
 """What a LiDAR inside a disc that walks over it says: nearer than anything that it can measure."""

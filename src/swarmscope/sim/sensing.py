@@ -7,10 +7,11 @@ import math
 from swarmscope._jit import jit, jit_inner
 from swarmscope.geometry import ray_circle, wrap_angle
 from swarmscope.onboard.percept import MAX_INBOX, MAX_NEIGHBOURS, Row
+from swarmscope.sim.beams import Beams
 from swarmscope.sim.cells import column_of, row_of
 from swarmscope.sim.errors import compass_error, measure_motion, spoil_scan
 from swarmscope.sim.lateness import cast_late, note_pose
-from swarmscope.sim.lidar import Beams, cast_disc, cast_static
+from swarmscope.sim.lidar import cast_disc, cast_static
 from swarmscope.sim.moving import cast_moving
 from swarmscope.sim.state import Sim
 from swarmscope.sim.streams import BEARING_NOISE, RANGE_NOISE, key, mix, normal

@@ -11,7 +11,7 @@ from swarmscope.onboard.percept import PEERS
 from swarmscope.onboard.rig import Rig
 from swarmscope.onboard.sharing.message import MAX_PACKET_BYTES
 from swarmscope.onboard.view import Swarm, new_swarm
-from swarmscope.sim.lidar import Beams
+from swarmscope.sim.beams import Beams
 from swarmscope.sim.moving import STANDSTILL, Moving
 from swarmscope.sim.streams import boot_number
 from swarmscope.sim.world import World

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from helpers import beams_of, circles_world, make_sensor, rig_of, scan_at
 from swarmscope.onboard.perception.rays import Rays
 from swarmscope.onboard.perception.reproject import Grid, Seat, reproject, settle
-from swarmscope.sim.lidar import cast_static, make_beams
+from swarmscope.sim.beams import make_beams
+from swarmscope.sim.lidar import cast_static
 
 RIG = rig_of()
 CIRCLE = Rays(-math.pi, math.pi / 180.0, True, 5.0)

@@ -19,7 +19,7 @@ from swarmscope.onboard.sharing.tracks import (
     update_odometry,
     update_tracks,
 )
-from swarmscope.sim.lidar import make_beams
+from swarmscope.sim.beams import make_beams
 
 STILL_S = 0.6
 

@@ -232,7 +232,7 @@ def was_free(see: View, x: float, y: float) -> bool:
 @jit_inner
 def _all_reach(scan: np.ndarray, first: int, last: int, far: float) -> bool:
     """Tell whether all beams from ``first`` to ``last`` of a kept scan reach so far [m]: any may have looked there."""
-    all_reach = True
+    reaching = True
     for n in range(first, last + 1):
-        all_reach &= abs(scan[n]) >= far  # NaN does not: nobody knows
-    return all_reach
+        reaching &= abs(scan[n]) >= far  # NaN does not: nobody knows
+    return reaching

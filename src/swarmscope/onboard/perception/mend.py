@@ -40,14 +40,7 @@ def mend(ranges: np.ndarray, rig: Rig, broken: np.ndarray) -> int:
     stand out there, and never farther than a body in the hole could be; with nothing sound beside it, it is what
     touches the body.
     """
-    least = least_range(rig)
-    count = 0
-    for n in range(ranges.size):
-        broken[n] = not ranges[n] >= least
-        count += broken[n]
-    if count > 0:
-        _bridge(ranges, rig, rig.sensor.wraps)
-    return count
+    return _fill(ranges, rig, rig.sensor.wraps, broken)
 
 
 @jit
@@ -57,13 +50,8 @@ def bridge(ranges: np.ndarray, closed: bool, rig: Rig, bridged: np.ndarray) -> N
     ``ranges (B,)`` [m] go round a circle only if it is ``closed``; ``bridged (B,)`` uint8 becomes 1 for what was
     replaced by a range.
     """
-    least, count = least_range(rig), 0
-    for n in range(ranges.size):
-        bridged[n] = not ranges[n] >= least
-        count += bridged[n]
-    if count == 0:
+    if _fill(ranges, rig, closed, bridged) == 0:
         return
-    _bridge(ranges, rig, closed)
     blocks = np.float32(BRIDGED * body_and_clearance(rig))
     for n in range(ranges.size):
         if bridged[n] and not ranges[n] > blocks:
@@ -72,9 +60,22 @@ def bridge(ranges: np.ndarray, closed: bool, rig: Rig, bridged: np.ndarray) -> N
 
 
 @jit_inner
-def _bridge(ranges: np.ndarray, rig: Rig, wraps: bool) -> None:
+def _fill(ranges: np.ndarray, rig: Rig, wraps: bool, broken: np.ndarray) -> int:
+    """Mark the broken readings, 1 in ``broken``, and bridge them; return how many there are."""
+    least = least_range(rig)
+    count = 0
+    for n in range(ranges.size):
+        broken[n] = not ranges[n] >= least
+        count += broken[n]
+    if count > 0:
+        _bridge(ranges, rig, wraps, least)
+    return count
+
+
+@jit_inner
+def _bridge(ranges: np.ndarray, rig: Rig, wraps: bool, least: float) -> None:
     """Bridge every run of broken readings."""
-    total, least = ranges.size, least_range(rig)
+    total = ranges.size
     first = 0
     if wraps:
         while first < total and not ranges[first] >= least:

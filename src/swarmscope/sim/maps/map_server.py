@@ -17,9 +17,9 @@ from swarmscope.sim.world import Grid, grid_from_solid, solid_from_grid
 from swarmscope.texts import check_regular, read_yaml
 
 YAML = (".yaml", ".yml")
+"""Ends of the names of map descriptions; any other file is a picture."""
 PLACES = {"task", "map", "place"}
 """Keys that files of maps do not have, and of which scenarios have one."""
-"""Ends of the names of map descriptions; any other file is a picture."""
 FREE_GREY, SOLID_GREY = 254, 0
 
 

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from swarmscope.errors import SwarmscopeError
 from swarmscope.held import Held
 from swarmscope.judging.run import Watch
-from swarmscope.sim.lidar import Beams
+from swarmscope.sim.beams import Beams
 from swarmscope.sim.state import Sim
 
 IN_MEMORY_BYTES = 256_000_000
