@@ -112,7 +112,15 @@ def test_broken_edges_wide_fields_and_late_scans_stop_nobody(fov, mount, how):
 
 @pytest.mark.parametrize(
     ("mount", "how"),
-    [((0.0, 0.0, 0.0), {}), ((0.0, 0.0, 0.0), {"late_s": 0.1}), ((0.05, 0.0, 0.0), {}), ((-0.05, 0.0, 0.0), {})],
+    [
+        ((0.0, 0.0, 0.0), {}),
+        ((0.0, 0.0, 0.0), {"late_s": 0.1}),
+        ((0.05, 0.0, 0.0), {}),
+        ((-0.05, 0.0, 0.0), {}),
+        ((-0.1, 0.0, 0.0), {}),
+        ((-0.14, 0.0, 0.0), {"late_s": 0.2}),
+        ((0.0, 0.14, 0.0), {"late_s": 0.1}),
+    ],
 )
 @pytest.mark.parametrize("radius", [0.01, 0.02])
 def test_a_post_in_a_hole_of_the_scan_is_not_touched_wherever_the_scan_was_taken(mount, how, radius):
@@ -123,7 +131,41 @@ def test_a_post_in_a_hole_of_the_scan_is_not_touched_wherever_the_scan_was_taken
     for _ in range(40):
         drive.tick(4.0, 0.0)
     assert drive.least > 0.0
-    assert drive.x > 0.3  # slowly: behind a hole something narrow may stand
+    assert drive.x > 0.3  # it stops where something narrow may stand in the hole, and turns to look
+
+
+@pytest.mark.parametrize("mount", [(0.0, 0.0, 0.0), (-0.14, 0.0, 0.0), (-0.1, 0.1, 0.0)])
+def test_a_hole_that_is_always_on_the_post_does_not_hide_it_for_long(mount):
+    """The post shows beside the hole when it is near, and nobody has looked past it before."""
+    drive = Drive(circles_world([(1.4, 0.0, 0.01)]), Lidar(mount=mount), (0.0, 0.0, 0.0))
+
+    def follow(scan):
+        found = np.flatnonzero(scan < 2.0)
+        for n in found[:1] if 0 < found.size < 5 else ():
+            scan[max(0, n - 2) : n + 4] = np.nan
+
+    drive.spoil = follow
+    for _ in range(60):
+        drive.tick(4.0, 0.0)
+    assert drive.least > 0.0
+
+
+@pytest.mark.parametrize(
+    ("masks", "mount"),
+    [
+        (((43.0, 47.0), (-47.0, -43.0)), (0.0, 0.0, 0.0)),
+        (((40.0, 50.0), (-50.0, -40.0)), (-0.04, 0.0, 0.0)),
+        (((85.0, 95.0), (-95.0, -85.0)), (0.1, 0.0, 0.0)),
+        (((35.0, 55.0),), (0.0, 0.0, 0.0)),
+        (((-2.0, 2.0),), (-0.1, 0.0, 0.0)),
+        (((-5.0, 5.0),), (0.0, 0.0, 0.0)),
+        (((130.0, 140.0), (-140.0, -130.0)), (-0.04, 0.0, 0.0)),
+    ],
+)
+def test_a_robot_whose_own_posts_are_masked_turns_to_look_past_them_and_arrives(masks, mount):
+    arrived, least = cross(Lidar(masks_deg=masks, mount=mount), 1)
+    assert arrived
+    assert least > 0.0
 
 
 def test_the_centre_sees_less_than_a_sensor_before_it():

@@ -117,7 +117,7 @@ def lay_out_scans(log: ScanLog, use: Use, rig: Rig) -> tuple[np.ndarray, Counts]
             scans[k] = raw
             continue
         back = np.zeros((raw.size, 3)) if was_at is None else was_at(k, use.beam_step * step_s * layout.order)
-        scans[k] = from_many_places(Taken(raw, layout, CENTRED, sensor.range_min), back, rig, wanted)
+        scans[k] = from_many_places(Taken(raw, layout, CENTRED, sensor.range_min), back, rig, wanted).scan
     turned = len(keys) - keys.count(_commonest(keys))
     found = dict(zip(COUNTED, counted.T, strict=True))
     return scans, Counts(**found, moved=0 if was_at is None else len(keys), turned=turned)
@@ -126,7 +126,7 @@ def lay_out_scans(log: ScanLog, use: Use, rig: Rig) -> tuple[np.ndarray, Counts]
 def _counted(values: np.ndarray, raw: np.ndarray, own: np.ndarray, layout: Layout, rig: Rig) -> tuple[int, ...]:
     """Return the fields of `Counts` of one scan: ``values (M,)`` as they were, ``raw (M,)`` as they are understood."""
     holes = ~(raw >= least_range(rig))
-    blocks = holes & (bridged(np.where(holes, np.nan, raw), layout, rig, rig.sensor.range_min)[1] == 0)
+    blocks = holes & np.isnan(bridged(np.where(holes, np.nan, raw), layout, rig, rig.sensor.range_min)[1])
     near = holes & ~own & ((values >= 0.0) | (values == -np.inf))
     broken = holes & ~own & ~near
     inside = ~holes & (raw < rig.body.radius_m)

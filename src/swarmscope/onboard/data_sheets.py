@@ -8,6 +8,7 @@ from typing import Any
 
 from swarmscope.errors import ConfigError, UnknownNameError
 from swarmscope.onboard.body import Body, protection_model
+from swarmscope.onboard.control.horizon import Horizon
 from swarmscope.onboard.edge import ADDRESSES, short
 from swarmscope.onboard.lidar import LEAST_VIEW_DEG, Lidar, finite, sensor_of, sweep_s
 from swarmscope.onboard.planners import Planner, load_planner
@@ -102,7 +103,8 @@ def rig_of(body: Body, lidar: Lidar, scans: Scans, options: Mapping[str, Any]) -
     guarding = guarding._replace(latency_s=guarding.latency_s + sweep_s(lidar))  # the oldest reading counts
     if guarding.strangers_mps > 0.0 and lidar.masks_deg:
         raise ConfigError("lidar.masks_deg", "somebody may come where this LiDAR is masked: strangers_mps 0 would do")
-    return make_rig(body, all_round(sensor_of(lidar, scans.grid)), guarding, safety, sharing)
+    rig = make_rig(body, all_round(sensor_of(lidar, scans.grid)), guarding, safety, sharing)
+    return rig._replace(horizon=Horizon(*(max(0.0, reach - offset) for reach in rig.horizon)))  # it is the sensor's
 
 
 def _part(kind: Any, options: Mapping[str, Any]) -> Any:
@@ -131,7 +133,7 @@ def check_horizon(rig: Rig, dt_s: float) -> None:
         raise ConfigError("lidar.fov_deg", f"{why}; {LEAST_VIEW_DEG:g} would do, seen from the body's centre")
     speed = min(SLOWEST_MPS, rig.body.v_max_mps)
     delay, brake = dt_s + guarding.latency_s, speed * speed / (2.0 * rig.body.a_max_mps2)
-    _check_view(rig, speed, taken + speed * delay + brake, "things", guarding.thinnest_m, 0.0)
+    _check_view(rig, speed, taken + speed * delay + brake, "things", guarding.thinnest_m, 0.5 * guarding.thinnest_m)
     if guarding.strangers_mps > 0.0:
         gap = speed * delay + brake + guarding.strangers_mps * (delay + speed / rig.body.a_max_mps2)
         smallest = guarding.strangers_m

@@ -39,6 +39,7 @@ PERCEPT = np.dtype(
         ("scan_x", np.float64),  # where the body was when the scan was taken, by odometry, body frame of now [m]
         ("scan_y", np.float64),
         ("scan_yaw", np.float64),  # [rad]
+        ("scan_hides", np.bool_),  # whether ``View.hidden`` has been written with the scan
         ("compass", np.float64),  # own heading, compass frame [rad]
         ("id", np.int64),  # own radio address
         ("boot", np.int64),  # drawn anew at every start, 0 to 65535

@@ -26,6 +26,7 @@ REASON_NAMES = (
     "guard: stands, another robot is in the way",
     "guard: stands, somebody may come round a corner",
     "guard: stands, looks at what it has not seen beside its way",
+    "guard: stands, looks at what a hole of its scan may hide",
     "guard: stands, the LiDAR loses too much of what is there",
     "guard: stands, a number is missing: time, speed, compass or command",
     "guard: stands, somebody who does not yield may come",
@@ -49,9 +50,10 @@ REASON_NAMES = (
     R_HELD_ROBOT,
     R_HELD_CORNER,
     R_HELD_UNSEEN,
+    R_HELD_HOLE,
     R_HELD_BLIND,
     R_HELD_NO_NUMBER,
     R_HELD_STRANGER,
     R_TURNS,
-) = range(21)
+) = range(22)
 FIRST_OWN = len(REASON_NAMES)

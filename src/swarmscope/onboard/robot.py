@@ -171,7 +171,7 @@ class Robot:
                 self._scans.take(scan, scan_s, float(now_s))
             self._fill(goal, heading, speed)
             self.seen = nearest_neighbours(neighbours, self.address, self.body.radius_m, self.faults)
-            self._scans.write(self._trail, float(now_s), self.rows.scan)
+            self._scans.write(self._trail, float(now_s), self.rows.found)
             return self._decide()
         except Unusable as fault:
             return self._brake(fault.kind, fault.why)
@@ -243,7 +243,7 @@ class Robot:
     def _decide(self) -> Command:
         """Run the planner and read its answer."""
         rows, body = self.rows, self.body
-        rows.fill(odom_x=self._driven[0], odom_y=self._driven[1], odom_yaw=self._driven[2])
+        rows.fill(odom_x=self._driven[0], odom_y=self._driven[1], odom_yaw=self._driven[2], scan_hides=True)
         rows.see(self.seen)
         rows.receive(self._mail.take())
         self._driven = (0.0, 0.0, 0.0)

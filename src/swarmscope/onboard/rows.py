@@ -9,6 +9,7 @@ import numpy as np
 from swarmscope.held import Held
 from swarmscope.onboard.percept import DECISION, PERCEPT, Row
 from swarmscope.onboard.perception.clock import skip_to
+from swarmscope.onboard.perception.reproject import Found
 from swarmscope.onboard.planners import Planner
 from swarmscope.onboard.rig import Rig
 from swarmscope.onboard.view import View, new_swarm, python_view
@@ -33,9 +34,14 @@ class Rows:
     @property
     def scan(self) -> np.ndarray:
         """What the LiDAR fills, (F,) float32 [m]: everything, or its field of view."""
+        return self.found.scan
+
+    @property
+    def found(self) -> Found:
+        """The same with what its holes hide, which counts where ``scan_hides`` is told."""
         sensor = self.rig.sensor
-        row: np.ndarray = self.swarm.scans[0, sensor.first : sensor.first + (sensor.field or sensor.beams)]
-        return row
+        field = slice(sensor.first, sensor.first + (sensor.field or sensor.beams))
+        return Found(self.swarm.scans[0, field], self.swarm.hidden[0, field])
 
     @property
     def percept(self) -> Row:

@@ -14,7 +14,7 @@ from swarmscope.errors import ConfigError
 from swarmscope.geometry import Pose
 from swarmscope.onboard.edge import Unusable, number, readings, short
 from swarmscope.onboard.lidar import Layout, Lidar, grid_of, lay_out, layout_of, same_rays, seen_from_above, sweep_s
-from swarmscope.onboard.perception.reproject import NEAR_M, NEAR_STEPS, Grid, settle
+from swarmscope.onboard.perception.reproject import NEAR_M, NEAR_STEPS, Found, Grid, settle
 from swarmscope.onboard.readings import must_be_millimetres, own_rays, translate
 from swarmscope.onboard.rig import Rig
 from swarmscope.onboard.sweep import Taken, from_many_places, from_one_place, seen_from_the_centre
@@ -128,12 +128,12 @@ class Scans:
         """Take in an open scan as the data sheet says."""
         self.take(np.full(self._lidar.beams, np.inf, np.float32), None, now_s)
 
-    def rehearse_moving(self, trail: Trail, out: np.ndarray) -> None:
+    def rehearse_moving(self, trail: Trail, out: Found) -> None:
         """Write the scan as one whose readings were taken one after the other."""
         self._write_straight(trail, out)
 
-    def write(self, trail: Trail, now_s: float, out: np.ndarray) -> None:
-        """Write what is seen from where the robot is now into ``out (M,)`` float32; raises Unusable."""
+    def write(self, trail: Trail, now_s: float, out: Found) -> None:
+        """Write what is seen from where the robot is now into ``out``; raises Unusable."""
         if self._stamp_s == -math.inf:
             raise Unusable("no scan", "there is no scan")
         self._check_age(now_s - self._stamp_s)
@@ -144,23 +144,23 @@ class Scans:
         if back is None:
             raise _unknown_motion()
         if self._told.direct and self._centred and _is_here(back, self.grid.rays.increment):
-            out[:] = self._scan
-            return
-        out[:] = from_one_place(self._taken(), back, self._rig, self._wanted)
+            _write_as_it_is(self._scan, out)
+        else:
+            _write(from_one_place(self._taken(), back, self._rig, self._wanted), out)
 
     def _taken(self) -> Taken:
         return Taken(self._scan, self._told.layout, self._lidar.mount, self._told.least_m)
 
-    def _write_straight(self, trail: Trail, out: np.ndarray) -> None:
+    def _write_straight(self, trail: Trail, out: Found) -> None:
         """Write a scan whose readings were taken one after the other."""
         back = trail.back_over(self._stamp_s + self._told.late_s)
         if back is None:
             raise _unknown_motion()
         near = NEAR_STEPS * self.grid.rays.increment
         if self._told.direct and self._centred and np.all(np.abs(back) <= (0.7 * NEAR_M, 0.7 * NEAR_M, near)):
-            out[:] = self._scan
-            return
-        out[:] = from_many_places(self._taken(), back, self._rig, self._wanted)
+            _write_as_it_is(self._scan, out)
+        else:
+            _write(from_many_places(self._taken(), back, self._rig, self._wanted), out)
 
     def _check_age(self, age_s: float) -> None:
         if age_s > STALE_PERIODS * self._period_s:
@@ -223,6 +223,15 @@ class Scans:
                 "scan", f"the scan takes {told_s} s by its time_increment, {sheet_s} s by lidar.time_increment_s"
             )
         return told
+
+
+def _write(found: Found, out: Found) -> None:
+    out.scan[:], out.hidden[:] = found
+
+
+def _write_as_it_is(scan: np.ndarray, out: Found) -> None:
+    """Write a scan whose holes are where they are: what they hide the kernels find out."""
+    out.scan[:], out.hidden[:] = scan, np.inf
 
 
 def _unknown_motion() -> Unusable:

@@ -15,7 +15,7 @@ from swarmscope.errors import ConfigError
 from swarmscope.geometry import TWO_PI, Pose
 from swarmscope.onboard.lidar import Layout
 from swarmscope.onboard.perception.mend import bridge
-from swarmscope.onboard.perception.reproject import Grid, Seat, reproject
+from swarmscope.onboard.perception.reproject import Found, Grid, Seat, reproject
 from swarmscope.onboard.perception.straighten import straighten
 from swarmscope.onboard.rig import Rig
 from swarmscope.onboard.sensor import Sensor
@@ -35,17 +35,17 @@ class Taken(NamedTuple):
     """Nearer things the sensor does not measure."""
 
 
-def from_one_place(taken: Taken, back: Pose, rig: Rig, wanted: Grid) -> np.ndarray:
+def from_one_place(taken: Taken, back: Pose, rig: Rig, wanted: Grid) -> Found:
     """Return a scan, taken when the body was at ``back``, as seen from where it is now, along ``wanted``."""
     scan, layout, mount, _ = taken
     x, y, _ = then(back, (*mount[:2], 0.0))
-    out = np.empty(wanted.cos.size, np.float32)
+    found = _found(wanted)
     seat = Seat(x, y, back[2], back[0], back[1], _core(rig))
-    reproject(*bridged(scan, layout, rig, _blind_m(taken)), layout.rays, seat, wanted, out)
-    return out
+    reproject(*bridged(scan, layout, rig, _blind_m(taken)), layout.rays, seat, wanted, found)
+    return found
 
 
-def from_many_places(taken: Taken, back: np.ndarray, rig: Rig, wanted: Grid) -> np.ndarray:
+def from_many_places(taken: Taken, back: np.ndarray, rig: Rig, wanted: Grid) -> Found:
     """Return the same of a scan whose ray n was taken when the body was at ``back[n]`` (B, 3)."""
     scan, layout, mount, _ = taken
     rays = layout.rays
@@ -54,10 +54,15 @@ def from_many_places(taken: Taken, back: np.ndarray, rig: Rig, wanted: Grid) -> 
     c, s = np.cos(back[:, 2]), np.sin(back[:, 2])
     x, y = back[:, 0] + c * mount[0] - s * mount[1], back[:, 1] + s * mount[0] + c * mount[1]
     turned = angles - rays.start - rays.increment * np.arange(scan.size)
-    out = np.empty(wanted.cos.size, np.float32)
+    found = _found(wanted)
     seats = np.column_stack([x, y, turned, back[:, 0], back[:, 1], np.full(scan.size, _core(rig))])
-    straighten(*bridged(scan, layout, rig, _blind_m(taken)), rays, seats, wanted, out)
-    return out
+    straighten(*bridged(scan, layout, rig, _blind_m(taken)), rays, seats, wanted, found)
+    return found
+
+
+def _found(wanted: Grid) -> Found:
+    """Return room for what is seen along ``wanted``."""
+    return Found(np.empty(wanted.cos.size, np.float32), np.empty(wanted.cos.size, np.float32))
 
 
 def seen_from_the_centre(layout: Layout, own: np.ndarray, mount: Mount, core: float) -> Layout:
@@ -68,10 +73,11 @@ def seen_from_the_centre(layout: Layout, own: np.ndarray, mount: Mount, core: fl
     """
     rays = layout.rays
     angles = rays.start + rays.increment * np.arange(layout.order.size)
-    out, open_scan = np.empty(angles.size, np.float32), np.where(own, np.nan, np.inf).astype(np.float32)
+    open_scan, no_hole = np.where(own, np.nan, np.inf).astype(np.float32), np.full(angles.size, np.nan, np.float32)
     seat, grid = Seat(*mount[:2], 0.0, 0.0, 0.0, core), Grid(rays, np.cos(angles), np.sin(angles))
-    reproject(open_scan, np.zeros(angles.size, np.uint8), rays, seat, grid, out)
-    seen = np.flatnonzero(~np.isnan(out))
+    found = _found(grid)
+    reproject(open_scan, no_hole, rays, seat, grid, found)
+    seen = np.flatnonzero(~np.isnan(found.scan))
     first, last = (int(seen[0]), int(seen[-1])) if seen.size else (0, 0)
     if not (angles[first] <= 1e-9 and angles[last] >= -1e-9 and last > first):
         raise ConfigError("lidar.mount", "the body's centre would not see straight ahead: mount it nearer the centre")
@@ -85,10 +91,13 @@ def _blind_m(taken: Taken) -> float:
 
 
 def bridged(scan: np.ndarray, layout: Layout, rig: Rig, blind_m: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return ``scan (M,)`` with the holes bridged that no body fits into, and which (M,) uint8; wider ones stay NaN."""
-    holes, filled = np.isnan(scan), np.zeros(scan.size, np.uint8)
+    """Return ``scan (M,)`` with the holes bridged that no body fits into, and from which range on each hides things.
+
+    That is (M,) float32 [m], NaN where none was bridged; wider holes stay NaN.
+    """
+    holes, hides = np.isnan(scan), np.full(scan.size, np.nan, np.float32)
     if not holes.any():
-        return scan, filled
+        return scan, hides
     whole, rays, sensor = scan.copy(), layout.rays, rig.sensor
     told = Sensor(
         beams=scan.size,
@@ -100,8 +109,9 @@ def bridged(scan: np.ndarray, layout: Layout, rig: Rig, blind_m: float) -> tuple
         range_sigma=sensor.range_sigma,
         position_sigma=sensor.position_sigma,
     )
-    bridge(whole, rays.closed, rig._replace(sensor=told), filled)
-    return np.where(holes, whole, scan), filled * holes
+    bridge(whole, rays.closed, rig._replace(sensor=told), hides)
+    hides[~holes] = np.nan
+    return np.where(holes, whole, scan), hides
 
 
 def _core(rig: Rig) -> float:

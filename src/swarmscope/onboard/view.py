@@ -22,8 +22,6 @@ FEWEST_FRAMES, FRAMES_PER_TURN = 6, 2.7
 GUARD_ALONE = 128
 """Added to ``View.unseen`` where a beam may have lost a return by rights, at the edge of a thing that the next beam
 sees: planners would give every edge a wider berth."""
-BROKEN = 64
-"""Added to ``View.unseen`` where the beam is broken and what stands there is bridged."""
 PAST_SCANS = 3
 """Scans that tell what moves."""
 POSE = 5
@@ -64,9 +62,12 @@ class View(NamedTuple):
     """(M,) float32: ranges as measured [m]; inf = no return, NaN = broken."""
     kept: np.ndarray
     """(M,) float32: the scan of the last tick with what it had lost; 0 = there was none, negative = up to where one has
-    looked through a broken beam's hole."""
+    looked in spite of a hole."""
     unseen: np.ndarray
-    """(M,) uint8: for how many ticks what is kept there has not been seen, plus GUARD_ALONE and BROKEN."""
+    """(M,) uint8: for how many ticks what is kept there has not been seen, plus GUARD_ALONE."""
+    hidden: np.ndarray
+    """(M,) float32: from which range on a hole of the scan may hide something narrow where the beam looks [m]; inf:
+    nowhere."""
     misses: np.ndarray
     """(M,) uint8: how often each beam has missed what the beams beside it saw, since it last saw something."""
     frames: Frames
@@ -110,6 +111,7 @@ class Swarm(NamedTuple):
     scans: np.ndarray
     kept: np.ndarray
     unseen: np.ndarray
+    hidden: np.ndarray
     misses: np.ndarray
     frames: Frames
     past: Past
@@ -152,6 +154,7 @@ def new_swarm(robots: int, rig: Rig) -> Swarm:
         scans=np.full((robots, beams), np.inf, np.float32),
         kept=np.zeros((robots, beams), np.float32),
         unseen=np.zeros((robots, beams), np.uint8),
+        hidden=np.full((robots, beams), np.inf, np.float32),
         misses=np.zeros((robots, beams), np.uint8),
         past=_past(robots, beams, kept),
         standing=np.zeros((robots, beams if kept else 0), np.uint8),
@@ -180,6 +183,7 @@ def view_of(swarm: Swarm, i: int) -> View:
         swarm.scans[i],
         swarm.kept[i],
         swarm.unseen[i],
+        swarm.hidden[i],
         swarm.misses[i],
         Frames(swarm.frames.scans[i], swarm.frames.poses[i]),
         Past(swarm.past.scans[i], swarm.past.poses[i], swarm.past.at_s[i]),

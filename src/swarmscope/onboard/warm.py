@@ -55,9 +55,9 @@ def _rehearse(scans: Scans, rows: Rows) -> None:
         trail.add(now, (0.01 * k, 0.0, 0.01))
         if k == 0:
             scans.rehearse(now)
-        scans.write(trail, 0.0, rows.scan)
+        scans.write(trail, 0.0, rows.found)
         if k == 1:
-            scans.rehearse_moving(trail, rows.scan)
+            scans.rehearse_moving(trail, rows.found)
         rows.scan[: rows.scan.size // 2 if k == 2 else 0] = 1.0
         rows.fill(now_s=now, dt_s=0.2, goal_distance=5.0, goal_bearing=0.1 * k)
         rows.see([Seen(1, 1.0, 0.5)] if k > 1 else [])

@@ -15,7 +15,6 @@ from swarmscope.onboard.body import Body
 from swarmscope.onboard.control.corners import Corner, apart_round, come_along, hidden_at, way_round
 from swarmscope.onboard.control.guard import guard
 from swarmscope.onboard.sensor import all_round
-from swarmscope.onboard.view import BROKEN
 from swarmscope.sim.world import Wall
 from swarmscope.storm.draw import Case
 from swarmscope.storm.play import watched
@@ -101,7 +100,7 @@ def hidden(ranges, n, side, rig=None, broken=()):
     """How far along the line of sight past beam n a body is hidden."""
     rows = one_robot(rig or rig_of())
     rows.view.scan[:] = ranges
-    rows.view.unseen[list(broken)] = BROKEN
+    rows.view.hidden[list(broken)] = 0.5
     return hidden_at(rows.view, n, side, rows.rig.body.radius_m, FAR)
 
 

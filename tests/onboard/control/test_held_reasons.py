@@ -14,6 +14,7 @@ from swarmscope.onboard.reasons import (
     R_FREE,
     R_HELD_BLIND,
     R_HELD_CORNER,
+    R_HELD_HOLE,
     R_HELD_NO_NUMBER,
     R_HELD_ROBOT,
     R_HELD_STRANGER,
@@ -25,7 +26,16 @@ from swarmscope.onboard.sensor import all_round
 from swarmscope.onboard.sharing.tracks import update_odometry, update_tracks
 
 OPEN = np.full(360, np.inf, np.float32)
-HELD = [R_HELD_THING, R_HELD_ROBOT, R_HELD_CORNER, R_HELD_UNSEEN, R_HELD_BLIND, R_HELD_NO_NUMBER, R_HELD_STRANGER]
+HELD = [
+    R_HELD_THING,
+    R_HELD_ROBOT,
+    R_HELD_CORNER,
+    R_HELD_UNSEEN,
+    R_HELD_HOLE,
+    R_HELD_BLIND,
+    R_HELD_NO_NUMBER,
+    R_HELD_STRANGER,
+]
 
 
 def asked(rows, v=0.5, w=0.0, speed=0.0, scan=OPEN):
@@ -43,8 +53,8 @@ def in_front_of(distance, rig):
 
 
 def test_the_guards_words_say_what_holds_it():
-    words = ("in the way", "another robot", "round a corner", "has not seen", "loses too much", "a number is missing")
-    words += ("does not yield",)
+    words = ("in the way", "another robot", "round a corner", "has not seen", "a hole of its scan")
+    words += ("loses too much", "a number is missing", "does not yield")
     for reason, said in zip(HELD, words, strict=True):
         assert REASON_NAMES[reason].startswith("guard: stands") and said in REASON_NAMES[reason]
 

@@ -1,4 +1,4 @@
-"""Holes of broken beams: what would show beside them, and what the last scan has looked through."""
+"""Holes of broken beams: what would show beside them, and what the last scan has looked at."""
 
 from __future__ import annotations
 
@@ -8,11 +8,9 @@ import numpy as np
 import pytest
 
 from helpers import make_sensor, one_robot, rig_of
-from swarmscope.onboard.perception.holes import nothing_up_to, shows_beside
 from swarmscope.onboard.perception.lost import keep_lost
-from swarmscope.onboard.perception.mend import mend
+from swarmscope.onboard.perception.mend import mend, shows_beside
 from swarmscope.onboard.sensor import all_round
-from swarmscope.onboard.view import BROKEN
 
 DEGREE = math.radians(1.0)
 
@@ -24,22 +22,22 @@ def scan_of(*broken, distance=3.0):
 
 
 def after(*scans, moved=(0.0, 0.0, 0.0), rows=None):
-    """The beams in whose holes something may stand, after some scans; ``moved`` before the last of them."""
+    """The beams in which something may be hidden within 1 m, after some scans; ``moved`` before the last of them."""
     rows = rows or one_robot()
     for k, scan in enumerate(scans):
         last = moved if k == len(scans) - 1 else (0.0, 0.0, 0.0)
-        rows.view.scan[:] = scan
+        rows.view.scan[:], rows.view.hidden[:] = scan, np.inf
         broken = mend(rows.view.scan, rows.rig, rows.view.safe)
         rows.fill(odom_x=last[0], odom_y=last[1], odom_yaw=last[2])
         keep_lost(rows.view, broken)
-    return np.flatnonzero(rows.view.unseen & BROKEN).tolist()
+    return np.flatnonzero(rows.view.hidden < 1.0).tolist()
 
 
 @pytest.mark.parametrize("width", [1, 2, 5])
 def test_what_shows_beside_a_hole(width):
-    """2 cm fill the hole there from beam to beam."""
+    """The post of 2 cm that ends there touches the beams on both sides of the hole."""
     reach = shows_beside(width, rig_of())
-    assert 2.0 * reach * math.sin(0.5 * (width + 1) * DEGREE) == pytest.approx(0.02)
+    assert (reach + 0.01) * math.sin(0.5 * (width + 1) * DEGREE) == pytest.approx(0.01)
 
 
 def test_beside_broken_beams_all_round_nothing_shows():
@@ -49,7 +47,7 @@ def test_beside_broken_beams_all_round_nothing_shows():
 def test_where_nothing_is_narrow_nothing_stands_in_a_hole():
     rows = one_robot(rig=rig_of(thinnest_m=0.0))
     assert after(scan_of(10, 11, 200), rows=rows) == []
-    assert nothing_up_to(rows.view, 10) == math.inf
+    assert shows_beside(1, rows.rig) == math.inf
     assert after(np.full(360, np.nan, np.float32), rows=rows) == []
 
 
@@ -83,7 +81,7 @@ def test_a_hole_where_the_circle_closes_is_one_hole():
     rows = one_robot()
     assert after(scan_of(359, 0, 1), rows=rows) == [0, 1, 359]
     for n in (359, 0, 1):
-        assert nothing_up_to(rows.view, n) == pytest.approx(shows_beside(3, rows.rig))
+        assert rows.view.hidden[n] == pytest.approx(shows_beside(3, rows.rig))
 
 
 def test_out_of_a_limited_view_the_last_scan_has_not_looked():
@@ -102,3 +100,26 @@ def test_where_odometry_drifts_the_beams_beside_the_place_count():
     drifting = one_robot(rig_of(odometry_drift_m=0.05))
     assert after(near, scan_of(180), moved=moved, rows=drifting) == [180]
     assert after(near, scan_of(180), moved=(0.0, 0.0, 0.0), rows=drifting) == []
+
+
+def test_of_a_hole_that_stays_as_much_is_known_as_was_looked_at_before():
+    """A hole of five beams ahead is turned into after 1 m ahead has been seen; then the robot drives on."""
+    rows, hole = one_robot(), scan_of(*range(178, 183))
+    assert after(scan_of(), hole, rows=rows) == []
+    known = rows.view.hidden[180]
+    assert known == math.inf  # up to where 2 cm show between two beams
+    assert after(hole, moved=(0.1, 0.0, 0.0), rows=rows) == []
+    assert rows.view.hidden[180] == pytest.approx(rows.rig.horizon.things - 0.1, abs=0.02)
+    for _ in range(9):
+        flagged = after(hole, moved=(0.1, 0.0, 0.0), rows=rows)
+    assert 180 in flagged
+    assert rows.view.hidden[180] == pytest.approx(shows_beside(5, rows.rig), abs=0.02)
+
+
+def test_a_post_that_slips_between_two_beams_has_not_been_looked_past():
+    """2 cm wide and 1.3 m away it may show in no beam: then the hole is on it until it is near."""
+    rows, hole = one_robot(), scan_of(179, 180, 181)
+    after(scan_of(), rows=rows)
+    for _ in range(4):
+        after(hole, moved=(0.1, 0.0, 0.0), rows=rows)
+    assert rows.view.hidden[180] < 1.3 - 0.4 - 0.01

@@ -15,7 +15,6 @@ from swarmscope.onboard.perception.lost import MEMORY, WITHIN, keep_lost
 from swarmscope.onboard.perception.mend import mend
 from swarmscope.onboard.sensor import all_round
 from swarmscope.onboard.sharing.tracks import update_odometry, update_tracks
-from swarmscope.onboard.view import BROKEN
 
 AHEAD = 180
 """The beam straight ahead; beams are 1 degree apart."""
@@ -148,14 +147,14 @@ def test_through_a_hole_nobody_looks_farther_than_to_what_bridges_it():
     rows = one_robot()
     given(rows, near)
     given(rows, hole)
-    assert not rows.view.unseen[180] & BROKEN
+    assert rows.view.hidden[180] == math.inf
     assert rows.view.kept[180] == pytest.approx(1.0, abs=0.02)  # it was there, and is kept
     rows = one_robot()
     for scan in (np.full(360, 3.0, np.float32), hole):
         given(rows, scan)
     assert rows.view.kept[180] == pytest.approx(-1.0, abs=0.02)
     given(rows, far)
-    assert rows.view.unseen[180] & BROKEN
+    assert rows.view.hidden[180] == pytest.approx(1.0, abs=0.02)
 
 
 def test_what_is_near_is_found_again_where_it_has_gone_in_a_step():

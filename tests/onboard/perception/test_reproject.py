@@ -10,14 +10,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from helpers import beams_of, circles_world, make_sensor, rig_of, scan_at
+from swarmscope.geometry import wrap_angle
+from swarmscope.onboard.perception.mend import shows_beside
 from swarmscope.onboard.perception.rays import Rays
-from swarmscope.onboard.perception.reproject import Grid, Seat, reproject, settle
+from swarmscope.onboard.perception.reproject import Found, Grid, Seat, reproject, settle
 from swarmscope.sim.beams import make_beams
 from swarmscope.sim.lidar import cast_static
 
 RIG = rig_of()
 CIRCLE = Rays(-math.pi, math.pi / 180.0, True, 5.0)
 CORE = 0.17
+ONE = math.radians(1.0)
 
 
 def world_and_seat(seed, away=0.3):
@@ -29,11 +32,16 @@ def world_and_seat(seed, away=0.3):
     return circles_world(trees), Seat(x, y, rng.uniform(-3.0, 3.0), x, y, CORE)
 
 
-def moved(scan, seat, rays=CIRCLE, grid=CIRCLE, size=360):
-    out = np.empty(size, np.float32)
+def found_from(scan, seat, rays=CIRCLE, grid=CIRCLE, size=360, hides=None):
+    found = Found(np.empty(size, np.float32), np.empty(size, np.float32))
     angles = grid.start + grid.increment * np.arange(size)
-    reproject(scan, np.zeros(scan.size, np.uint8), rays, seat, Grid(grid, np.cos(angles), np.sin(angles)), out)
-    return out
+    hides = np.full(scan.size, np.nan, np.float32) if hides is None else hides
+    reproject(scan, hides, rays, seat, Grid(grid, np.cos(angles), np.sin(angles)), found)
+    return found
+
+
+def moved(scan, seat, rays=CIRCLE, grid=CIRCLE, size=360):
+    return found_from(scan, seat, rays, grid, size).scan
 
 
 def points(ranges):
@@ -136,16 +144,52 @@ def test_of_a_wide_field_that_has_turned_most_is_still_seen(fov, turned):
     assert seen[fov // 2 - 60 : fov // 2 + 60].all()
 
 
+def hole_at(*rays, from_m=0.5):
+    hides = np.full(360, np.nan, np.float32)
+    hides[list(rays)] = from_m
+    return hides
+
+
 def test_what_was_bridged_is_broken_from_elsewhere_too():
-    scan = np.full(360, 2.0, np.float32)
-    bridged = np.zeros(360, np.uint8)
-    bridged[[180, 270, 271]] = 1
-    out = np.empty(360, np.float32)
-    angles = CIRCLE.start + CIRCLE.increment * np.arange(360)
     seat = Seat(0.05, 0.0, 0.0, 0.05, 0.0, CORE)
-    reproject(scan, bridged, CIRCLE, seat, Grid(CIRCLE, np.cos(angles), np.sin(angles)), out)
-    broken = np.flatnonzero(np.isnan(out))
-    assert broken.tolist() == [180, 269, 270]
+    out = found_from(np.full(360, 2.0, np.float32), seat, hides=hole_at(180, 270, 271)).scan
+    assert np.flatnonzero(np.isnan(out)).tolist() == [180, 269, 270]
+
+
+def test_a_hole_hides_what_lies_along_the_sensors_rays():
+    """A sensor 0.1 m behind the centre has a hole straight ahead, one 0.1 m before it has one to its left."""
+    scan = np.full(360, 2.0, np.float32)
+    hidden = found_from(scan, Seat(-0.1, 0.0, 0.0, 0.0, 0.0, CORE), hides=hole_at(179, 180, 181)).hidden
+    near = 0.5 * math.cos(math.radians(2.0)) - 0.1
+    assert hidden[178:183] == pytest.approx(near, rel=2e-3)
+    assert (hidden[:176] == np.inf).all() and (hidden[185:] == np.inf).all()
+    hidden = found_from(scan, Seat(0.1, 0.0, 0.0, 0.0, 0.0, CORE), hides=hole_at(270)).hidden
+    crossed = np.flatnonzero(hidden < np.inf)
+    assert crossed.tolist() == list(range(258, 269))  # 0.5 to 2 m beside a place 0.1 m ahead
+    assert hidden[258] == pytest.approx(math.hypot(0.1, 0.5), abs=0.01)
+    assert (hidden[259:269] < 2.01).all() and (np.diff(hidden[259:269]) > -0.01).all()
+
+
+@given(seed=st.integers(0, 2**31))
+def test_no_post_in_a_hole_is_nearer_than_what_may_be_hidden_there(seed):
+    """Posts of 2 cm that the beams beside a hole do not meet, wherever the sensor is."""
+    rng = np.random.default_rng(seed)
+    width, first = int(rng.integers(1, 7)), int(rng.integers(0, 360))
+    rays = (first + np.arange(width)) % 360
+    away, angle = rng.uniform(0.0, 0.14), rng.uniform(-math.pi, math.pi)
+    seat = Seat(away * math.cos(angle), away * math.sin(angle), rng.uniform(-3.0, 3.0), 0.0, 0.0, CORE)
+    half = math.radians(0.5 * (width + 1))
+    far = rng.uniform(0.01 / math.sin(half), 2.9)
+    aside = max(0.0, half - math.asin(0.01 / far))
+    along = CIRCLE.start + seat.yaw + math.radians(first + 0.5 * (width - 1)) + rng.uniform(-aside, aside)
+    x, y = seat.x + far * math.cos(along), seat.y + far * math.sin(along)
+    if math.hypot(x, y) < CORE + 0.01:
+        return
+    hides = hole_at(*rays, from_m=shows_beside(width, RIG))
+    hidden = found_from(np.full(360, 3.0, np.float32), seat, hides=hides).hidden
+    distance = math.hypot(x, y)
+    beams = [n for n in range(360) if abs(wrap_angle(CIRCLE.start + math.radians(n) - math.atan2(y, x))) < ONE]
+    assert hidden[beams].min() < distance - 0.01 + 0.005
 
 
 def test_broken_edges_of_a_field_are_no_part_of_it():

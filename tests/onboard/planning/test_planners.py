@@ -22,7 +22,7 @@ from swarmscope.onboard.sharing.message import OK, decode
 from swarmscope.onboard.view import arrays_of, new_swarm
 
 PLANNERS = planner_names()
-MEMORY_LIMIT = 18_700
+MEMORY_LIMIT = 20_200
 """Bytes of planner memory per robot."""
 LATENTS = 1_200
 """Bytes more for planners that keep what the networks of eight neighbours say."""

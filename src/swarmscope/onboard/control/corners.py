@@ -16,7 +16,7 @@ from swarmscope.onboard.control.halves import Others, leaves_half, met_by
 from swarmscope.onboard.control.way import Way
 from swarmscope.onboard.perception.beams import beam_at
 from swarmscope.onboard.rig import SIGMAS, Rig
-from swarmscope.onboard.view import BROKEN, View
+from swarmscope.onboard.view import View
 
 
 class Corner(NamedTuple):
@@ -227,8 +227,8 @@ def hidden_at(see: View, n: int, side: int, radius: float, enough: float) -> flo
 
 @jit_inline
 def _shows_its_end(see: View, m: int) -> bool:
-    """Tell whether beam m says how far one sees: not where it is broken, nor open out of view, where nobody looks."""
-    if see.unseen[m] & BROKEN:
+    """Tell whether beam m says how far one sees: not past what may be hidden, nor open out of view: nobody looks."""
+    if see.hidden[m] < see.scan[m]:
         return False
     in_view = see.rig.sensor.field == 0 or see.shared["view_first"] <= m <= see.shared["view_last"]
     return bool(in_view or see.scan[m] < see.rig.sensor.range_max)

@@ -22,12 +22,12 @@ from swarmscope.onboard.control.unseen import look_round, out_of_sight, reaches_
 from swarmscope.onboard.control.way import STEPS, Way, closer, shadowed, way_of
 from swarmscope.onboard.percept import MAX_NEIGHBOURS, PEERS, Row
 from swarmscope.onboard.perception.frames import is_blurred
-from swarmscope.onboard.perception.holes import nothing_up_to
 from swarmscope.onboard.perception.mend import body_and_clearance, least_range
 from swarmscope.onboard.perception.standing import MOVES, STANDS
 from swarmscope.onboard.reasons import (
     R_HELD_BLIND,
     R_HELD_CORNER,
+    R_HELD_HOLE,
     R_HELD_NO_NUMBER,
     R_HELD_ROBOT,
     R_HELD_STRANGER,
@@ -36,13 +36,15 @@ from swarmscope.onboard.reasons import (
 )
 from swarmscope.onboard.rig import ROUNDING_M, SIGMAS, Rig
 from swarmscope.onboard.sharing.tracks import near_track, on_track, returns_of
-from swarmscope.onboard.view import BROKEN, View
+from swarmscope.onboard.view import View
 
 FRACTIONS = (1.0, 0.8, 0.6, 0.4, 0.2, 0.1, 0.05, 0.0)
 CREEP = 0.4
 """Where somebody may come who does not yield the slowest speed but 0 is slower by this: it may be all that passes."""
 LEAST_MPS = 1e-3
 """There what is slower than this stands."""
+HARDLY = 0.25
+"""A robot that a hole of its scan lets drive no faster than this share of what it wants rather stands, and looks."""
 FREE = -1
 STANDS_MPS = 1e-6
 SOME_LOSSES, MOST_LOSSES = 0.2, 0.35
@@ -67,7 +69,9 @@ def guard(see: View) -> bool:
     w = min(rig.body.w_max_radps, max(-rig.body.w_max_radps, w))
     asked = min(rig.body.v_max_mps, max(0.0, asked))
     v, w, why = _allowed(see, asked, w)
-    if rig.sensor.field > 0 and percept["speed"] <= STANDS_MPS:
+    if why == R_HELD_HOLE and max(v, percept["speed"]) <= HARDLY * asked:
+        v, w = 0.0, w if percept["speed"] <= STANDS_MPS else 0.0
+    if percept["speed"] <= STANDS_MPS:
         v, w, why = look_round(see, v, w, why)
     out["v"], out["w"] = v, w
     if why != FREE and v == 0.0 and percept["speed"] <= STANDS_MPS:
@@ -178,7 +182,7 @@ def _near(see: View, speed: float) -> int:
     far = np.float32(limit + ROUNDING_M)
     count = 0
     for n in range(rig.sensor.beams):
-        if (not ranges[n] >= far) | (see.unseen[n] & BROKEN != 0):
+        if (not ranges[n] >= far) | (see.hidden[n] < far):
             near[count] = n
             count += 1
     return count
@@ -202,9 +206,8 @@ def _held_by(see: View, v: float, w: float, near: int) -> int:
     for k in range(near):
         n = int(see.edges[k])
         held = _held_by_beam(see, n, way, others, bulge, enough)
-        if held == R_HELD_THING and rig.sensor.field > 0 and is_blurred(see, n):
-            see.shared["unseen_left"] = rig.sin[n] > 0.0
-            return R_HELD_UNSEEN
+        if held == R_HELD_THING:
+            return _what_is_at(see, n)
         if held != FREE:
             return held
     held = _held_by_unseen(see, way, bulge)
@@ -213,6 +216,17 @@ def _held_by(see: View, v: float, w: float, near: int) -> int:
     if held == FREE and way.turns and rig.guarding.latency_s > 0.0:
         held = _held_at_once(see, way_of(speed, v, w, 0.0, see), bulge, near)
     return held
+
+
+@jit_inner
+def _what_is_at(see: View, n: int) -> int:
+    """Return the reason of a robot that keeps off what beam n sees: it may be no thing, but that nobody has looked."""
+    if see.hidden[n] < see.scan[n]:
+        return R_HELD_HOLE
+    if see.rig.sensor.field > 0 and is_blurred(see, n):
+        see.shared["unseen_left"] = see.rig.sin[n] > 0.0
+        return R_HELD_UNSEEN
+    return R_HELD_THING
 
 
 @jit_inner
@@ -239,7 +253,7 @@ def _held_at_once(see: View, way: Way, bulge: float, near: int) -> int:
         n = int(see.edges[k])
         s, need = _nearest_of(see, n, bulge)
         if _meets(see, n, s, need, way):
-            return R_HELD_THING
+            return _what_is_at(see, n)
     return _held_by_unseen(see, way, bulge)
 
 
@@ -270,8 +284,9 @@ def _nearest_of(see: View, n: int, bulge: float) -> tuple[float, float]:
     if not s >= least_range(rig):
         s = body_and_clearance(rig)
     kept, s = _kept_from(s, bulge, rig)
-    if see.unseen[n] & BROKEN:
-        s = min(s, nothing_up_to(see, n))
+    if see.hidden[n] < s:
+        s = see.hidden[n]
+        kept, _ = _kept_from(s, bulge, rig)
     return s, min(kept, s - 1e-6)  # already too close: never closer
 
 

@@ -29,7 +29,7 @@ def horizon_of(smallest_m: float, strangers_m: float, sensor: Sensor, thinnest_m
     if sensor.increment >= math.pi:
         return Horizon(0.0, 0.0, 0.0)
     between = 2.0 * math.sin(0.5 * sensor.increment)
-    things = thinnest_m / between if thinnest_m > 0.0 else math.inf
+    things = thinnest_m / between - 0.5 * thinnest_m if thinnest_m > 0.0 else math.inf
     robots = 2.0 * smallest_m / between - smallest_m
     strangers = 2.0 * strangers_m / between - strangers_m
     return Horizon(*(min(sensor.range_max, reach) for reach in (things, robots, strangers)))

@@ -1,4 +1,4 @@
-"""What a robot of limited view does about places that it has not seen: it keeps off them, and looks round."""
+"""What a robot does about places that it has not seen: it keeps off them, and turns to look at them."""
 
 from __future__ import annotations
 
@@ -8,11 +8,13 @@ from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.onboard.control.way import Way, closer, corner_of
 from swarmscope.onboard.perception.beams import beam_at, nearest_beam
 from swarmscope.onboard.perception.frames import in_view, was_free
-from swarmscope.onboard.reasons import R_HELD_UNSEEN
+from swarmscope.onboard.reasons import R_HELD_HOLE, R_HELD_UNSEEN
 from swarmscope.onboard.view import View
 
 LOOK_SHARE = 0.4
 """Of the field of view, by which a robot that looks round turns in a tick."""
+ASIDE_RAD = 0.2
+"""By so much a robot that sees all round turns in a tick to look where a hole of its scan is."""
 FRONT_RAD = 1.8
 """The front of the body is looked at up to this angle to either side [rad], ..."""
 GRAIN_M = 0.05
@@ -48,17 +50,31 @@ def reaches_between(radius: float) -> float:
 
 @jit
 def look_round(see: View, v: float, w: float, why: int) -> tuple[float, float, int]:
-    """Return the command of a robot of limited view that stands, and why: it turns once round where it has not seen
-    what is beside its way, so slowly that scans overlap."""
+    """Return the command of a robot that stands, and why: it turns to look at what keeps it from driving.
+
+    With a limited view it turns once round where it has not seen what is beside its way, so slowly that scans overlap.
+    Where a hole of the scan may hide something it turns until the hole has moved on by its own width.
+    """
     shared, field = see.shared, see.rig.sensor.increment * see.rig.sensor.field
     if shared["look_rad"] > 0.0:
         shared["look_rad"] -= abs(see.percept["odom_yaw"])
     elif why == R_HELD_UNSEEN and v == 0.0:
         shared["look_rad"] = 2.0 * math.pi - 0.5 * field
+    elif why == R_HELD_HOLE and v == 0.0:
+        shared["look_rad"], shared["unseen_left"] = _hidden_rad(see), w >= 0.0
     if not shared["look_rad"] > 0.0:
         return v, w, why
-    turn = min(see.rig.body.w_max_radps, LOOK_SHARE * field / see.percept["dt_s"])
-    return 0.0, turn if shared["unseen_left"] else -turn, R_HELD_UNSEEN
+    turn = min(see.rig.body.w_max_radps, (LOOK_SHARE * field if field > 0.0 else ASIDE_RAD) / see.percept["dt_s"])
+    return 0.0, turn if shared["unseen_left"] else -turn, R_HELD_UNSEEN if field > 0.0 else R_HELD_HOLE
+
+
+@jit_inner
+def _hidden_rad(see: View) -> float:
+    """Return under which angle, all in all, something may be hidden, at most half a turn [rad]."""
+    beams = 0
+    for n in range(see.rig.sensor.beams):
+        beams += see.hidden[n] < see.scan[n]
+    return min(math.pi, beams * see.rig.sensor.increment)
 
 
 @jit_inner

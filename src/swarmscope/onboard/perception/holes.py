@@ -1,87 +1,137 @@
-"""Broken beams: up to where nothing can stand in the hole that they make, for it would show beside it.
+"""Holes of the scan: from which range on something narrow may stand there unseen.
 
-A hole through which the last scan has looked is none: what stands has not come there since.
+Nearer, it would show beside the hole. Where the last scan has looked nothing stands: it has not come there since.
 """
 
 from __future__ import annotations
 
 import math
 
-from swarmscope._jit import jit, jit_inner
+from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.geometry import then
 from swarmscope.onboard.perception.beams import beam_at, nearest_beam
 from swarmscope.onboard.perception.frames import astray, in_view
-from swarmscope.onboard.rig import Rig
-from swarmscope.onboard.view import BROKEN, View
+from swarmscope.onboard.perception.mend import shows_beside
+from swarmscope.onboard.sensor import Sensor
+from swarmscope.onboard.view import View
 
-LOOKED_THROUGH = 2
-"""In ``View.safe`` while it says which beams are broken: the last scan has looked there."""
-PLACES = 4
-"""Places along a broken beam at which the last scan must have looked by, each twice as far as the one before."""
+BROKEN, LOOKED_THROUGH = 1, 2
+"""In ``View.safe`` while it says which beams are broken; the last scan has looked where the second kind does."""
+FARTHER = 2.0
+"""Places along a beam at which the last scan must have looked by are so many times as far as the one before."""
+FINER = 6
+"""How often the way from the last of them where it has to the first where it has not is halved."""
+ROUNDING = 1e-5
+
+
+@jit_inline
+def has_holes(see: View) -> bool:
+    """Tell whether ``see.hidden`` says that something may be hidden anywhere."""
+    hides = False
+    for n in range(see.rig.sensor.beams):
+        hides |= see.hidden[n] < math.inf
+    return hides
 
 
 @jit
-def find_looked_through(see: View) -> None:
-    """Mark the broken beams, 1 in ``see.safe``, through which the last scan has looked; `BROKEN` are all of them."""
+def find_hidden(see: View) -> None:
+    """Write into ``see.hidden`` what broken beams, 1 in ``see.safe``, hide; take out what the last scan has looked at.
+
+    Where it has looked along all of a broken beam, that is `LOOKED_THROUGH`.
+    """
+    radius, elsewhere = see.rig.body.radius_m, has_holes(see)
     for n in range(see.rig.sensor.beams):
-        see.unseen[n] = BROKEN if see.safe[n] else 0
-    for n in range(see.rig.sensor.beams):
-        if see.safe[n] and _looked_through(see, n):
+        reach = see.hidden[n]
+        if see.safe[n]:
+            reach = min(reach, _nothing_up_to(see, n, LOOKED_THROUGH))
+        see.hidden[n] = _looked_up_to(see, n, max(radius, reach)) if reach < math.inf else math.inf
+        if see.safe[n] and see.hidden[n] == math.inf:
             see.safe[n] = LOOKED_THROUGH
+    if elsewhere:
+        return
+    for n in range(see.rig.sensor.beams):  # what is left of a hole is narrower
+        if see.safe[n] == BROKEN:
+            see.hidden[n] = max(see.hidden[n], _nothing_up_to(see, n, BROKEN))
 
 
-@jit
-def nothing_up_to(see: View, n: int) -> float:
-    """Return up to which range, the body's surface at least, nothing can stand in the hole that beam n is in [m].
+@jit_inner
+def _nothing_up_to(see: View, n: int, most: int) -> float:
+    """Return up to which range nothing stands in the hole that beam n is in [m], made of beams marked ``most`` or less.
 
     inf where nothing is narrow (`Guarding.thinnest_m` 0).
     """
-    if not see.rig.guarding.thinnest_m > 0.0:
-        return math.inf
     sensor, radius, width = see.rig.sensor, see.rig.body.radius_m, 1
     for step in (1, -1):
         k = beam_at(n + step, sensor)
-        while k >= 0 and see.unseen[k] & BROKEN and shows_beside(width, see.rig) > radius:
+        while k >= 0 and BROKEN <= see.safe[k] <= most and radius < shows_beside(width, see.rig) < math.inf:
             width += 1
             k = beam_at(k + step, sensor)
-    return max(radius, shows_beside(width, see.rig))
-
-
-@jit
-def shows_beside(width: int, rig: Rig) -> float:
-    """Return up to which range the narrowest thing shows beside ``width`` broken beams [m]."""
-    half = 0.5 * (width + 1) * rig.sensor.increment
-    return 0.5 * rig.guarding.thinnest_m / math.sin(half) if half < 0.5 * math.pi else 0.0
+    return shows_beside(width, see.rig)
 
 
 @jit_inner
-def _looked_through(see: View, n: int) -> bool:
-    """Tell whether the last scan reached beyond the places along beam n from which on something may stand there."""
-    rig, percept, reach = see.rig, see.percept, nothing_up_to(see, n)
-    if reach == math.inf:
-        return True
+def _looked_up_to(see: View, n: int, reach: float) -> float:
+    """Return up to which range the last scan has looked along beam n, from ``reach`` on [m]; inf: as far as counts.
+
+    That is up to where what is narrow would show between two beams, farther than which no robot relies on its eyes.
+    """
+    far, known, before = min(float(see.scan[n]), _narrow_shows_up_to(see)), 0.0, -1
+    if reach >= far:
+        return math.inf
+    middle = _looked_at(see, n, reach, before)
+    if middle < 0:
+        return reach
+    while middle >= 0:
+        if reach >= far:
+            return math.inf
+        known, before = reach, middle
+        reach = min(FARTHER * reach, far)
+        middle = _looked_at(see, n, reach, before)
+    for _ in range(FINER):
+        place = 0.5 * (known + reach)
+        middle = _looked_at(see, n, place, before)
+        if middle < 0:
+            reach = place
+        else:
+            known, before = place, middle
+    return known
+
+
+@jit_inline
+def _narrow_shows_up_to(see: View) -> float:
+    """Return how far from here what is narrow has shown between two beams for sure, however late the scan is [m]."""
+    late: float = see.rig.guarding.latency_s * abs(see.percept["speed"])
+    return see.rig.horizon.things - late
+
+
+@jit_inner
+def _looked_at(see: View, n: int, reach: float, before: int) -> int:
+    """Return which beam of the last scan has looked at the place ``reach`` [m] along beam n; -1: none has for sure.
+
+    Every beam that may have, and those from beam ``before`` on if there is one, must have reached as far, and what is
+    narrow must show there.
+    """
+    rig, percept = see.rig, see.percept
     here = (percept["odom_x"], percept["odom_y"], percept["odom_yaw"])
-    for _ in range(PLACES):
-        x, y, _yaw = then(here, (reach * rig.cos[n], reach * rig.sin[n], 0.0))
-        if rig.sensor.field > 0 and not in_view(x, y, see):
-            return False
-        if not _reached_beyond(see, x, y):
-            return False
-        reach *= 2.0
-        if reach >= see.scan[n]:
-            break
-    return True
+    x, y, _ = then(here, (reach * rig.cos[n], reach * rig.sin[n], 0.0))
+    if rig.sensor.field > 0 and not in_view(x, y, see):
+        return -1
+    distance, middle = math.sqrt(x * x + y * y), nearest_beam(x, y, 0.0, rig.sensor)
+    off = astray(math.sqrt(here[0] ** 2 + here[1] ** 2), abs(here[2]), distance, rig)
+    aside = int(math.ceil(off / max(distance, 1e-9) / rig.sensor.increment))
+    since = _from_beam(before, middle, rig.sensor) if before >= 0 else 0
+    far = (distance + off) * (1.0 - ROUNDING)
+    looked = far <= _narrow_shows_up_to(see)
+    for m in range(middle + min(0, since) - aside, middle + max(0, since) + aside + 1):
+        k = beam_at(m, rig.sensor)
+        looked &= k < 0 or abs(see.kept[k]) >= far
+    return middle if looked else -1
 
 
 @jit_inner
-def _reached_beyond(see: View, x: float, y: float) -> bool:
-    """Tell whether every beam of the last scan that may have looked at (x, y) [m] from there reached beyond it."""
-    rig, way = see.rig, math.sqrt(see.percept["odom_x"] ** 2 + see.percept["odom_y"] ** 2)
-    distance, middle = math.sqrt(x * x + y * y), nearest_beam(x, y, 0.0, rig.sensor)
-    off = astray(way, abs(see.percept["odom_yaw"]), distance, rig)
-    aside = int(math.ceil(off / max(distance, 1e-9) / rig.sensor.increment))
-    for m in range(middle - aside, middle + aside + 1):
-        k = beam_at(m, rig.sensor)
-        if k >= 0 and not abs(see.kept[k]) > distance + off:
-            return False
-    return True
+def _from_beam(before: int, beam: int, sensor: Sensor) -> int:
+    """Return how many beams ``before`` lies before ``beam``, below 0, or after it, the shorter way round a circle."""
+    since = before - beam
+    if sensor.wraps and abs(since) > sensor.beams // 2:
+        since -= sensor.beams if since > 0 else -sensor.beams
+    return since

@@ -16,11 +16,11 @@ from swarmscope.geometry import Pose, rough_angle
 from swarmscope.onboard.percept import Row
 from swarmscope.onboard.perception.beams import beam_at
 from swarmscope.onboard.perception.frames import in_view
-from swarmscope.onboard.perception.holes import LOOKED_THROUGH, find_looked_through
+from swarmscope.onboard.perception.holes import find_hidden, has_holes
 from swarmscope.onboard.perception.mend import least_range
 from swarmscope.onboard.perception.standing import STANDS
 from swarmscope.onboard.sharing.tracks import was_near_track
-from swarmscope.onboard.view import BROKEN, GUARD_ALONE, View
+from swarmscope.onboard.view import GUARD_ALONE, View
 
 WITHIN = 0.9
 """Returns beyond this share of the range are not kept: they leave it by themselves."""
@@ -38,7 +38,7 @@ FEWEST_SCANS = 3.0
 """It is kept for so many scans at least, however slowly they come: what one beam sees may be lost twice in a row."""
 DROPPED = np.float32(-1e9)
 SLIPS = 2
-MOST_TICKS = BROKEN - 1
+MOST_TICKS = GUARD_ALONE - 1
 
 
 @jit_inline
@@ -58,32 +58,37 @@ def keep_lost(see: View, broken: int) -> None:
         most = min(float(MOST_TICKS), max(scans, rig.guarding.lost_s / percept["dt_s"]))
         lost, found = _find_lost(see, int(most + 0.5))
     _note_losses(percept, see.shared, seen, lost)
-    if broken > 0:
-        find_looked_through(see)
+    holes = broken > 0 or has_holes(see)
+    if holes:
+        find_hidden(see)
     for n in range(rig.sensor.beams):
         see.unseen[n] = 0
         see.kept[n] = see.scan[n]
-    if broken > 0:
-        _keep_broken(see)
+    if holes:
+        _keep_holes(see)
     if found:
         _write_back(see)
 
 
 @jit_inner
-def _keep_broken(see: View) -> None:
-    """Note which beams are broken, in the kept scan as well."""
+def _keep_holes(see: View) -> None:
+    """Keep of beams that are broken, or cross what a hole hides, up to where one has looked."""
     for n in range(see.rig.sensor.beams):
-        see.unseen[n] = BROKEN if see.safe[n] == 1 else 0
-        if see.safe[n]:
-            see.kept[n] = -see.scan[n] if see.safe[n] == LOOKED_THROUGH else 0.0
+        if see.safe[n] or see.hidden[n] < see.scan[n]:
+            see.kept[n] = -min(see.scan[n], see.hidden[n])
 
 
 @jit_inner
 def _write_back(see: View) -> None:
-    """Write what was lost into the scan and into the kept one; a bridge just before it stands for it."""
+    """Write what was lost into the scan; a bridge just before it stands for it.
+
+    It is kept where nothing may be hidden before it: there the kept scan says up to where one has looked.
+    """
     for n in range(see.rig.sensor.beams):
         if see.filtered[n] < see.scan[n] + SAME_M:
-            see.scan[n] = see.kept[n] = min(see.filtered[n], see.scan[n])
+            see.scan[n] = min(see.filtered[n], see.scan[n])
+            if not see.hidden[n] < see.scan[n]:
+                see.kept[n] = see.scan[n]
             see.unseen[n] += see.edges[n]
 
 

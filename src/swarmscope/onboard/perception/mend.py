@@ -44,19 +44,48 @@ def mend(ranges: np.ndarray, rig: Rig, broken: np.ndarray) -> int:
 
 
 @jit
-def bridge(ranges: np.ndarray, closed: bool, rig: Rig, bridged: np.ndarray) -> None:
+def bridge(ranges: np.ndarray, closed: bool, rig: Rig, hides: np.ndarray) -> None:
     """Replace broken readings as ``mend`` does where no body fits into the hole; where it blocks they become NaN.
 
-    ``ranges (B,)`` [m] go round a circle only if it is ``closed``; ``bridged (B,)`` uint8 becomes 1 for what was
-    replaced by a range.
+    ``ranges (B,)`` [m] go round a circle only if it is ``closed``. ``hides (B,)`` becomes NaN but for what was replaced
+    by a range: there it is the range from which on the hole may hide something narrow [m].
     """
-    if _fill(ranges, rig, closed, bridged) == 0:
+    if _fill(ranges, rig, closed, hides) == 0:
+        hides[:] = np.nan
         return
     blocks = np.float32(BRIDGED * body_and_clearance(rig))
     for n in range(ranges.size):
-        if bridged[n] and not ranges[n] > blocks:
-            ranges[n] = np.nan
-            bridged[n] = 0
+        if hides[n] == 0.0:
+            hides[n] = np.nan
+        elif not ranges[n] > blocks:
+            ranges[n] = hides[n] = np.nan
+    for n in range(ranges.size):
+        if hides[n] >= 0.0:
+            hides[n] = shows_beside(_width(hides, n, closed), rig)
+
+
+@jit_inner
+def _width(hides: np.ndarray, n: int, closed: bool) -> int:
+    """Return how many rays the hole has that ray n is in: those beside it that are not NaN."""
+    width, total = 1, hides.size
+    for step in (1, -1):
+        k = n + step
+        while width < total and (closed or 0 <= k < total) and hides[k % total] >= 0.0:
+            width += 1
+            k += step
+    return width
+
+
+@jit
+def shows_beside(width: int, rig: Rig) -> float:
+    """Return up to which range nothing stands that ``width`` broken beams hide: it would show beside them [m].
+
+    The narrowest thing there is touches the beams on both sides of a hole and ends there. inf where nothing is narrow.
+    """
+    half = 0.5 * (width + 1) * rig.sensor.increment
+    if not rig.guarding.thinnest_m > 0.0:
+        return math.inf
+    return 0.5 * rig.guarding.thinnest_m * (1.0 / math.sin(half) - 1.0) if half < 0.5 * math.pi else 0.0
 
 
 @jit_inner

@@ -3,7 +3,8 @@
 What a scan knows is the area between the sensor and its readings. Its border is what a robot elsewhere sees: the
 returns, joined ray by ray (between a near and a far one lies the edge of a shadow, and nobody knows what is in it), and
 walls along broken rays. Directions in which no border is seen are broken (NaN), and so are those that cross the edge of
-a limited field before one: nobody has looked there. Holes that were bridged are holes from elsewhere, too.
+a limited field before one: nobody has looked there. Holes that were bridged are holes from elsewhere, too;
+what they hide lies along the sensor's rays, and is seen from here under another angle.
 """
 
 from __future__ import annotations
@@ -55,6 +56,15 @@ class Grid(NamedTuple):
     sin: np.ndarray
 
 
+class Found(NamedTuple):
+    """What is seen from where we are, along the rays of a `Grid`."""
+
+    scan: np.ndarray
+    """(M,) float32 [m]: +inf for no return, NaN where nobody has looked or a hole was bridged."""
+    hidden: np.ndarray
+    """(M,) float32: from which range on a hole that was bridged may hide something narrow [m]; inf: nowhere."""
+
+
 class End(NamedTuple):
     """A point of the border [m] and its bearing [rad], from where we are."""
 
@@ -65,11 +75,13 @@ class End(NamedTuple):
 
 @jit_inline
 def move_on(see: View) -> None:
-    """Make ``see.scan`` of a moment before what is seen from where the robot is now.
+    """Make ``see.scan`` of a moment before what is seen from where the robot is now, and ``see.hidden`` what it hides.
 
-    ``see.filtered`` and ``see.safe`` are scratch.
+    ``see.filtered`` and ``see.padded`` are scratch.
     """
     percept = see.percept
+    if not percept["scan_hides"]:
+        see.hidden[:] = np.inf
     far = math.hypot(percept["scan_x"], percept["scan_y"]) > NEAR_M
     if far or abs(percept["scan_yaw"]) > NEAR_STEPS * see.rig.sensor.increment:
         _see_from_here(see)
@@ -81,15 +93,16 @@ def _see_from_here(see: View) -> None:
     percept, rig, sensor = see.percept, see.rig, see.rig.sensor
     first, closed = sensor.first, sensor.wraps and sensor.field == 0
     count = sensor.field if sensor.field > 0 else sensor.beams
-    taken, bridged, here = see.filtered[:count], see.safe[:count], see.scan[first : first + count]
+    taken, hides = see.filtered[:count], see.padded[:count]
+    here = Found(see.scan[first : first + count], see.hidden[first : first + count])
     for n in range(count):
-        taken[n] = here[n]
-    bridge(taken, closed, rig, bridged)
+        taken[n] = here.scan[n]
+    bridge(taken, closed, rig, hides)
     rays = Rays(sensor.angle_min + first * sensor.increment, sensor.increment, closed, sensor.range_max)
     x, y, yaw = percept["scan_x"], percept["scan_y"], percept["scan_yaw"]
     seat = Seat(x, y, yaw, x, y, rig.body.radius_m + rig.guarding.clearance_m)
     grid = Grid(rays, rig.cos[first : first + count], rig.sin[first : first + count])
-    reproject(taken, bridged, rays, seat, grid, here)
+    reproject(taken, hides, rays, seat, grid, here)
 
 
 @jit
@@ -110,14 +123,15 @@ def settle(raw: np.ndarray, order: np.ndarray, least: float, most: float, out: n
 
 
 @jit
-def reproject(scan: np.ndarray, bridged: np.ndarray, rays: Rays, seat: Seat, grid: Grid, out: np.ndarray) -> None:
-    """Write ``scan (B,)``, taken from ``seat`` along ``rays``, into ``out (M,)`` along ``grid`` round where we are.
+def reproject(scan: np.ndarray, hides: np.ndarray, rays: Rays, seat: Seat, grid: Grid, found: Found) -> None:
+    """Fill ``found`` from ``scan (B,)``, taken from ``seat`` along ``rays``.
 
-    Both are float32 [m], +inf for no return, NaN for broken readings. A limited field ends with its outermost sound
-    rays. What looks where ``bridged (B,)`` is 1 is broken again: something narrow may stand there.
+    It is float32 [m], +inf for no return, NaN for broken readings. A limited field ends with its outermost sound rays.
+    Where ``hides (B,)`` is no NaN a hole was bridged: something narrow may stand there from that range on [m], and what
+    looks there is broken again.
     """
-    for n in range(out.size):
-        out[n] = np.nan
+    out = found.scan
+    out[:], found.hidden[:] = np.nan, np.inf
     first, last = sound_part(scan, rays.closed)
     if last < first:
         return
@@ -138,10 +152,14 @@ def reproject(scan: np.ndarray, bridged: np.ndarray, rays: Rays, seat: Seat, gri
         _leave_out(rays.start + seat.yaw + last * rays.increment, seat, grid, out)
         _end_view(grid, out)
     for k in range(first, last + 1):
-        if bridged[k]:
-            left, right = k + 1 if k + 1 < scan.size else 0, k - 1 if k > 0 else scan.size - 1
-            a, b = _end(scan[right], right, rays, seat), _end(scan[left], left, rays, seat)
+        if hides[k] >= 0.0:
+            after, prior = k + 1 if k + 1 < scan.size else 0, k - 1 if k > 0 else scan.size - 1
+            a, b = _end(scan[prior], prior, rays, seat), _end(scan[after], after, rays, seat)
             _break(a, _end(scan[k], k, rays, seat), b, grid, out)
+        stop = end_of_hole(hides, k, last)
+        if stop > k:
+            right, left = _side(hides[k], scan[k], k - 1, rays, seat), _side(hides[k], scan[k], stop, rays, seat)
+            _hide(right, left, grid, found.hidden)
 
 
 @jit_inline
@@ -155,6 +173,32 @@ def sound_part(scan: np.ndarray, closed: bool) -> tuple[int, int]:
     while last >= first and not scan[last] >= 0.0:
         last -= 1
     return first, last
+
+
+@jit_inline
+def end_of_hole(hides: np.ndarray, k: int, last: int) -> int:
+    """Return the number after the last ray, ``last`` at most, of the hole that begins at ray k; k where none begins."""
+    if not hides[k] >= 0.0 or (k > 0 and hides[k - 1] >= 0.0):
+        return k
+    stop = k + 1
+    while stop <= last and hides[stop] >= 0.0:
+        stop += 1
+    return stop
+
+
+@jit_inner
+def _side(near: float, far: float, k: int, rays: Rays, seat: Seat) -> tuple[End, End]:
+    """Return where ray k, beside a hole that hides what is between ``near`` and ``far`` [m], begins to and ends."""
+    return _outside(rays.start + seat.yaw + k * rays.increment, near, min(far, rays.reach), seat)
+
+
+@jit_inner
+def _hide(right: tuple[End, End], left: tuple[End, End], grid: Grid, hidden: np.ndarray) -> None:
+    """Lower ``hidden`` to the border of what lies between the two sides of a hole."""
+    for a, b in ((right[0], left[0]), right, left):
+        _draw(a, b, True, grid, hidden)
+        _dot(a, grid, hidden)
+        _dot(b, grid, hidden)
 
 
 @jit_inner
@@ -183,7 +227,7 @@ def _join(range_a: float, range_b: float, a: End, b: End, grid: Grid, out: np.nd
 @jit_inner
 def _wall(angle: float, reach: float, seat: Seat, grid: Grid, out: np.ndarray) -> None:
     """Draw the ray at ``angle`` from where it leaves the robot, then and now, to its end."""
-    a, b = _outside(angle, reach, seat)
+    a, b = _outside(angle, 0.0, reach, seat)
     _draw(a, b, True, grid, out)
     _dot(a, grid, out)
 
@@ -191,7 +235,7 @@ def _wall(angle: float, reach: float, seat: Seat, grid: Grid, out: np.ndarray) -
 @jit_inner
 def _leave_out(angle: float, seat: Seat, grid: Grid, out: np.ndarray) -> None:
     """Mark every direction that crosses the ray at ``angle``, an edge of the field, before it meets a border."""
-    a, b = _outside(angle, grid.rays.reach, seat)
+    a, b = _outside(angle, 0.0, grid.rays.reach, seat)
     low, high = _between(a, b, grid, out.size)
     turn = int(math.floor(2.0 * math.pi / grid.rays.increment + 0.5))
     for k in range(low, high + 1):
@@ -235,13 +279,13 @@ def _break(a: End, middle: End, b: End, grid: Grid, out: np.ndarray) -> None:
 
 
 @jit_inner
-def _outside(angle: float, reach: float, seat: Seat) -> tuple[End, End]:
-    """Return where the ray at ``angle`` leaves the robot, then and now, and where it ends."""
+def _outside(angle: float, near: float, far: float, seat: Seat) -> tuple[End, End]:
+    """Return where the ray at ``angle`` is ``near`` [m] long, or leaves the robot, then and now, and its end."""
     dx, dy = math.cos(angle), math.sin(angle)
-    begin = max(_leaves(dx, dy, -seat.x, -seat.y, seat.core), 0.0)
+    begin = max(_leaves(dx, dy, -seat.x, -seat.y, seat.core), near)
     begin = max(begin, _leaves(dx, dy, seat.body_x - seat.x, seat.body_y - seat.y, seat.core))
     ax, ay = seat.x + begin * dx, seat.y + begin * dy
-    bx, by = seat.x + reach * dx, seat.y + reach * dy
+    bx, by = seat.x + far * dx, seat.y + far * dy
     return End(ax, ay, math.atan2(ay, ax)), End(bx, by, math.atan2(by, bx))
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from swarmscope._jit import jit, jit_inner
 from swarmscope.onboard.perception.rays import Rays
 from swarmscope.onboard.perception.reproject import (  # the same border, drawn in the same way
+    Found,
     Grid,
     Seat,
     _beside_unknown,
@@ -19,9 +20,12 @@ from swarmscope.onboard.perception.reproject import (  # the same border, drawn 
     _dot,
     _end,
     _end_view,
+    _hide,
     _join,
     _leave_out,
+    _side,
     _wall,
+    end_of_hole,
     sound_part,
 )
 
@@ -30,16 +34,13 @@ ON_LINE_M = 0.005
 
 
 @jit
-def straighten(
-    scan: np.ndarray, bridged: np.ndarray, rays: Rays, seats: np.ndarray, grid: Grid, out: np.ndarray
-) -> None:
-    """Write ``scan (B,)`` into ``out (M,)`` along ``grid`` round where we are; ray k was taken from ``seats[k]``.
+def straighten(scan: np.ndarray, hides: np.ndarray, rays: Rays, seats: np.ndarray, grid: Grid, found: Found) -> None:
+    """Fill ``found`` as ``reproject`` does, where ray k was taken from ``seats[k]``.
 
-    ``seats (B, 6)`` holds the fields of a Seat each; yaw is by how much the ray is turned. Ranges are
-    float32 [m], +inf for no return, NaN for broken ones, ``bridged (B,)`` 1 where a hole was bridged.
+    ``seats (B, 6)`` holds the fields of a Seat each; yaw is by how much the ray is turned.
     """
-    for n in range(out.size):
-        out[n] = np.nan
+    out = found.scan
+    out[:], found.hidden[:] = np.nan, np.inf
     first, last = sound_part(scan, rays.closed)
     if last < first:
         return
@@ -60,8 +61,13 @@ def straighten(
             _leave_out(rays.start + seat.yaw + k * rays.increment, seat, grid, out)
         _end_view(grid, out)
     for k in range(first, last + 1):
-        if bridged[k]:
+        if hides[k] >= 0.0:
             _break_at(scan, k, rays, seats, grid, out)
+        stop = end_of_hole(hides, k, last)
+        if stop > k:
+            right = _side(hides[k], scan[k], k - 1, rays, _seat(seats, k - 1))
+            left = _side(hides[k], scan[k], stop, rays, _seat(seats, stop % len(seats)))
+            _hide(right, left, grid, found.hidden)
 
 
 @jit_inner
