@@ -75,7 +75,7 @@ def hand_made(
 
 
 SMALL: dict[str, Any] = {
-    "scenario": {"robots": 4, "limit_s": 60.0, "lidar": {"beams": 90}},
+    "scenario": {"robots": 4, "limit_s": 80.0, "lidar": {"beams": 90}},
     "sweeps": [{"name": "w_i", "planner": "Ours", "key": "planner.params.w_i", "values": [0, 1]}],
     "figures": ["boxes", "paths", "sweeps", "field", "cases", "weight", "resources"],
 }
