@@ -102,6 +102,8 @@ def break_edges(scan):
         (330.0, (0.0, 0.0, 0.0), {"late_s": 0.2}),
         (340.0, (-0.1, 0.05, 0.0), {}),
         (350.0, (0.0, 0.05, 0.0), {"late_s": 0.1}),
+        (60.0, (0.0, 0.0, 0.0), {"late_s": 0.2}),
+        (50.0, (0.0, 0.0, 0.0), {"late_s": 0.2}),
     ],
 )
 def test_broken_edges_wide_fields_and_late_scans_stop_nobody(fov, mount, how):
@@ -134,18 +136,38 @@ def test_a_post_in_a_hole_of_the_scan_is_not_touched_wherever_the_scan_was_taken
     assert drive.x > 0.3  # it stops where something narrow may stand in the hole, and turns to look
 
 
-@pytest.mark.parametrize("mount", [(0.0, 0.0, 0.0), (-0.14, 0.0, 0.0), (-0.1, 0.1, 0.0)])
-def test_a_hole_that_is_always_on_the_post_does_not_hide_it_for_long(mount):
-    """The post shows beside the hole when it is near, and nobody has looked past it before."""
-    drive = Drive(circles_world([(1.4, 0.0, 0.01)]), Lidar(mount=mount), (0.0, 0.0, 0.0))
+def blind_at_returns(first, count):
+    """Spoil scans as a post does that gives no sound reading: ``count`` beams from its middle less ``first`` on."""
 
-    def follow(scan):
+    def spoil(scan):
         found = np.flatnonzero(scan < 2.0)
-        for n in found[:1] if 0 < found.size < 5 else ():
-            scan[max(0, n - 2) : n + 4] = np.nan
+        if found.size:
+            middle = int(round(found.mean())) - first
+            scan[np.arange(middle, middle + count) % scan.size] = np.nan
 
-    drive.spoil = follow
-    for _ in range(60):
+    return spoil
+
+
+@pytest.mark.parametrize(
+    ("fov", "mount", "late_s"),
+    [
+        (360.0, (0.0, 0.0, 0.0), 0.0),
+        (360.0, (-0.14, 0.0, 0.0), 0.2),
+        (180.0, (0.1, 0.1, 0.0), 0.2),
+        (90.0, (0.05, 0.0, 0.0), 0.1),
+        (90.0, (-0.05, 0.0, 0.0), 0.2),
+        (90.0, (0.0, -0.14, 0.0), 0.0),
+        (90.0, (-0.1, 0.1, 0.0), 0.2),
+    ],
+)
+@pytest.mark.parametrize("y", [0.0, 0.05, -0.12])
+@pytest.mark.parametrize(("first", "count"), [(0, 1), (1, 2), (1, 3), (2, 5)])
+def test_a_post_that_gives_no_sound_reading_is_not_touched(fov, mount, late_s, y, first, count):
+    """It shows beside the hole when it is near; nobody has looked past it before, and no scan kept has, either."""
+    lidar = Lidar(beams=360 if fov == 360.0 else int(fov) + 1, fov_deg=fov, mount=mount)
+    world, spoil = circles_world([(1.2, y, 0.01)]), blind_at_returns(first, count)
+    drive = Drive(world, lidar, (0.0, 0.0, 0.0), spoil, late_s)
+    for _ in range(45):
         drive.tick(4.0, 0.0)
     assert drive.least > 0.0
 
@@ -166,6 +188,17 @@ def test_a_robot_whose_own_posts_are_masked_turns_to_look_past_them_and_arrives(
     arrived, least = cross(Lidar(masks_deg=masks, mount=mount), 1)
     assert arrived
     assert least > 0.0
+
+
+@pytest.mark.parametrize("step_s", [0.1 / 360, -0.1 / 360])
+@pytest.mark.parametrize("yaw", [2.0, 3.0, -2.5])
+def test_the_gap_of_a_circle_that_was_swept_in_a_turn_is_no_return_that_gets_lost(step_s, yaw):
+    """In an empty place; the robot was held, "the LiDAR loses too much of what is there"."""
+    lidar = Lidar(time_increment_s=step_s)
+    drive = Drive(circles_world([(10.0, 10.0, 0.1)]), lidar, (0.0, 0.0, yaw), late_s=0.1)
+    for _ in range(60):
+        drive.tick(4.0, 0.0)
+    assert drive.x > 3.9
 
 
 def test_the_centre_sees_less_than_a_sensor_before_it():

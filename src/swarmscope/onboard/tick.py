@@ -14,7 +14,7 @@ from swarmscope.onboard.perception.clock import keep_time
 from swarmscope.onboard.perception.faulty import leave_out_faulty
 from swarmscope.onboard.perception.features import align_features, extrema
 from swarmscope.onboard.perception.filters import filter_padded, prepare_scan
-from swarmscope.onboard.perception.frames import keep_frame, look_back
+from swarmscope.onboard.perception.frames import keep_frame, look_back, shorten_frame
 from swarmscope.onboard.perception.lost import keep_lost
 from swarmscope.onboard.perception.mend import mend
 from swarmscope.onboard.perception.reproject import move_on
@@ -44,9 +44,10 @@ def perceive(see: View, still_s: float) -> None:
     if see.rig.sensor.field > 0:
         look_back(see)
     broken = mend(see.scan, see.rig, see.safe)
-    if see.rig.sensor.field > 0:
-        keep_frame(see)
+    at = keep_frame(see) if see.rig.sensor.field > 0 else -1
     keep_lost(see, broken)
+    if at >= 0:
+        shorten_frame(see, at)
     if see.rig.guarding.strangers_mps > 0.0:
         tell_standing(see)
     measure_bodies(see)

@@ -12,14 +12,14 @@ from swarmscope.onboard.reasons import R_HELD_HOLE, R_HELD_UNSEEN
 from swarmscope.onboard.view import View
 
 LOOK_SHARE = 0.4
-"""Of the field of view, by which a robot that looks round turns in a tick."""
+"""Of what it sees of its field of view, by which a robot that looks round turns in a tick."""
 ASIDE_RAD = 0.2
 """By so much a robot that sees all round turns in a tick to look where a hole of its scan is."""
 FRONT_RAD = 1.8
 """The front of the body is looked at up to this angle to either side [rad], ..."""
-GRAIN_M = 0.05
+GRAIN_M = 0.02
 """... in places so far apart."""
-ROUND_M = 0.05
+ROUND_M = 0.01
 """Radius of the narrowest round thing that must not reach between two of them."""
 
 
@@ -64,7 +64,8 @@ def look_round(see: View, v: float, w: float, why: int) -> tuple[float, float, i
         shared["look_rad"], shared["unseen_left"] = _hidden_rad(see), w >= 0.0
     if not shared["look_rad"] > 0.0:
         return v, w, why
-    turn = min(see.rig.body.w_max_radps, (LOOK_SHARE * field if field > 0.0 else ASIDE_RAD) / see.percept["dt_s"])
+    seen = see.rig.sensor.increment * (shared["view_last"] - shared["view_first"] + 1)  # less while late scans turn
+    turn = min(see.rig.body.w_max_radps, (LOOK_SHARE * seen if field > 0.0 else ASIDE_RAD) / see.percept["dt_s"])
     return 0.0, turn if shared["unseen_left"] else -turn, R_HELD_UNSEEN if field > 0.0 else R_HELD_HOLE
 
 

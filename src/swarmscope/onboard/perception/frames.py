@@ -154,16 +154,27 @@ def _draw_neighbour(see: View, t: int) -> None:
 
 
 @jit
-def keep_frame(see: View) -> None:
-    """Keep the scan, which has been mended since ``look_back``, if it shows something new."""
+def keep_frame(see: View) -> int:
+    """Keep the scan, which has been mended since ``look_back``, if it shows something new; return where, else -1."""
     at = _slot(see)
     if at < 0:
-        return
+        return at
     see.shared["frames_n"] = max(see.shared["frames_n"], at + 1)
     see.shared["frame_at"] = at
     for k in range(POSE):
         see.frames.poses[at, k] = 0.0
     _copy(see, see.frames.scans[at])
+    return at
+
+
+@jit
+def shorten_frame(see: View, at: int) -> None:
+    """Let the scan kept at ``at`` have seen free no more than up to where a hole of it may hide something."""
+    scan = see.frames.scans[at]
+    for j in range(scan.size):
+        hidden = see.hidden[see.rig.sensor.first + j]
+        if abs(scan[j]) > hidden:
+            scan[j] = -hidden
 
 
 @jit_inner
@@ -187,7 +198,8 @@ def _slot(see: View) -> int:
 def _copy(see: View, out: np.ndarray) -> None:
     """Keep the scan: negative where the return is a neighbour's (free up to there), NaN where nothing is known.
 
-    What was broken counts as seen where it was bridged, not where the hole was so wide that it blocks.
+    What was broken counts as seen where it was bridged, but for what the hole may hide (`shorten_frame`), not where it
+    was so wide that it blocks.
     """
     rig, touching = see.rig, body_and_clearance(see.rig) + 1e-5
     for j in range(out.size):
@@ -209,11 +221,18 @@ def in_view(x: float, y: float, see: View) -> bool:
     return lies_between(x, y, see.shared["view_first"], see.shared["view_last"], see.rig.sensor)
 
 
+@jit_inline
+def narrow_shows_up_to(see: View) -> float:
+    """Return how far from here what is narrow has shown between two beams for sure, however late the scan is [m]."""
+    late: float = see.rig.guarding.latency_s * abs(see.percept["speed"])
+    return see.rig.horizon.things - late
+
+
 @jit
 def was_free(see: View, x: float, y: float) -> bool:
     """Tell whether the point (x, y), body frame [m], outside the view, has been seen free."""
     sensor, core = see.rig.sensor, see.rig.body.radius_m
-    reach = math.sqrt(x * x + y * y)
+    reach, shows = math.sqrt(x * x + y * y), narrow_shows_up_to(see)
     if reach < core:
         return True
     for k in range(see.shared["frames_n"]):
@@ -222,6 +241,8 @@ def was_free(see: View, x: float, y: float) -> bool:
         away, off = math.sqrt(px * px + py * py), _astray(pose, reach, see.rig)
         if away + off < core:
             return True
+        if away + off > shows:
+            continue
         n = nearest_beam(px, py, pose[2], sensor) - sensor.first
         aside = int(math.ceil(off / max(away, 1e-9) / sensor.increment)) if off > 0.0 else 0
         if aside <= n < sensor.field - aside and _all_reach(see.frames.scans[k], n - aside, n + aside, away + off):

@@ -10,7 +10,7 @@ import math
 from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.geometry import then
 from swarmscope.onboard.perception.beams import beam_at, nearest_beam
-from swarmscope.onboard.perception.frames import astray, in_view
+from swarmscope.onboard.perception.frames import astray, in_view, narrow_shows_up_to
 from swarmscope.onboard.perception.mend import shows_beside
 from swarmscope.onboard.sensor import Sensor
 from swarmscope.onboard.view import View
@@ -75,7 +75,7 @@ def _looked_up_to(see: View, n: int, reach: float) -> float:
 
     That is up to where what is narrow would show between two beams, farther than which no robot relies on its eyes.
     """
-    far, known, before = min(float(see.scan[n]), _narrow_shows_up_to(see)), 0.0, -1
+    far, known, before = min(float(see.scan[n]), narrow_shows_up_to(see)), 0.0, -1
     if reach >= far:
         return math.inf
     middle = _looked_at(see, n, reach, before)
@@ -97,13 +97,6 @@ def _looked_up_to(see: View, n: int, reach: float) -> float:
     return known
 
 
-@jit_inline
-def _narrow_shows_up_to(see: View) -> float:
-    """Return how far from here what is narrow has shown between two beams for sure, however late the scan is [m]."""
-    late: float = see.rig.guarding.latency_s * abs(see.percept["speed"])
-    return see.rig.horizon.things - late
-
-
 @jit_inner
 def _looked_at(see: View, n: int, reach: float, before: int) -> int:
     """Return which beam of the last scan has looked at the place ``reach`` [m] along beam n; -1: none has for sure.
@@ -121,7 +114,7 @@ def _looked_at(see: View, n: int, reach: float, before: int) -> int:
     aside = int(math.ceil(off / max(distance, 1e-9) / rig.sensor.increment))
     since = _from_beam(before, middle, rig.sensor) if before >= 0 else 0
     far = (distance + off) * (1.0 - ROUNDING)
-    looked = far <= _narrow_shows_up_to(see)
+    looked = far <= narrow_shows_up_to(see)
     for m in range(middle + min(0, since) - aside, middle + max(0, since) + aside + 1):
         k = beam_at(m, rig.sensor)
         looked &= k < 0 or abs(see.kept[k]) >= far

@@ -26,6 +26,8 @@ ON_BORDER = math.pi - 0.01
 
 UNSEEN = np.float32(-1.0)
 """Marks a direction in which nobody has looked from here on."""
+UNKNOWN, OPEN, SOLID = range(3)
+"""What is between the ends of two rays."""
 NEARER = 0.98
 """What is nearer than this share of a hole's border hides the hole."""
 NEAR_M, NEAR_STEPS = 0.002, 0.25
@@ -139,14 +141,14 @@ def reproject(scan: np.ndarray, hides: np.ndarray, rays: Rays, seat: Seat, grid:
     for k in range(first, last + 1):
         end = _end(scan[k], k, rays, seat)
         if k > first:
-            _join(scan[k - 1], scan[k], before, end, grid, out)
+            _join(border_of(scan, hides, k - 1, k), before, end, grid, out)
         if _beside_unknown(scan, k):
             _wall(rays.start + seat.yaw + k * rays.increment, rays.reach, seat, grid, out)
         if scan[k] < np.inf:
             _dot(end, grid, out)
         before = end
     if rays.closed:
-        _join(scan[last], scan[first], before, begin, grid, out)
+        _join(border_of(scan, hides, last, first), before, begin, grid, out)
     else:
         _leave_out(rays.start + seat.yaw + first * rays.increment, seat, grid, out)
         _leave_out(rays.start + seat.yaw + last * rays.increment, seat, grid, out)
@@ -217,11 +219,26 @@ def _end(s: float, k: int, rays: Rays, seat: Seat) -> End:
     return End(x, y, math.atan2(y, x))
 
 
+@jit_inline
+def border_of(scan: np.ndarray, hides: np.ndarray, i: int, k: int) -> int:
+    """Return whether there is a border between the ends of two rays: `SOLID`, `OPEN`, or `UNKNOWN`.
+
+    There is none where both saw nothing; nor where one did and the other was bridged: no thing begins there.
+    """
+    if not (scan[i] >= 0.0 and scan[k] >= 0.0):
+        return UNKNOWN
+    if scan[i] < np.inf and scan[k] < np.inf:
+        return SOLID
+    if not (scan[i] < np.inf or scan[k] < np.inf):
+        return OPEN
+    return OPEN if hides[i] >= 0.0 or hides[k] >= 0.0 else SOLID
+
+
 @jit_inner
-def _join(range_a: float, range_b: float, a: End, b: End, grid: Grid, out: np.ndarray) -> None:
-    """Draw the border between the ends of two rays; where both saw nothing there is none."""
-    if range_a >= 0.0 and range_b >= 0.0:
-        _draw(a, b, range_a < np.inf or range_b < np.inf, grid, out)
+def _join(border: int, a: End, b: End, grid: Grid, out: np.ndarray) -> None:
+    """Draw the border between the ends of two rays."""
+    if border != UNKNOWN:
+        _draw(a, b, border == SOLID, grid, out)
 
 
 @jit_inner

@@ -25,6 +25,7 @@ from swarmscope.onboard.perception.reproject import (  # the same border, drawn 
     _leave_out,
     _side,
     _wall,
+    border_of,
     end_of_hole,
     sound_part,
 )
@@ -49,7 +50,7 @@ def straighten(scan: np.ndarray, hides: np.ndarray, rays: Rays, seats: np.ndarra
         seat = _seat(seats, k)
         end = _end(scan[k], k, rays, seat)
         if (k > first or rays.closed) and _is_next(seats, k, rays):
-            _join(scan[k - 1 if k > 0 else last], scan[k], before, end, grid, out)
+            _join(border_of(scan, hides, k - 1 if k > 0 else last, k), before, end, grid, out)
         if _beside_unknown(scan, k):
             _wall(rays.start + seat.yaw + k * rays.increment, rays.reach, seat, grid, out)
         if scan[k] < np.inf and not _is_in_line(scan, k, rays, seats):
