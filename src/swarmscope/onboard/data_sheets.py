@@ -9,8 +9,10 @@ from typing import Any
 from swarmscope.errors import ConfigError, UnknownNameError
 from swarmscope.onboard.body import Body, protection_model
 from swarmscope.onboard.control.horizon import Horizon
+from swarmscope.onboard.control.unseen import reaches_between
 from swarmscope.onboard.edge import ADDRESSES, short
 from swarmscope.onboard.lidar import LEAST_VIEW_DEG, Lidar, finite, sensor_of, sweep_s
+from swarmscope.onboard.perception.frames import STEP_RADII
 from swarmscope.onboard.planners import Planner, load_planner
 from swarmscope.onboard.rig import GUARDING, SAFETY, SHARING, Guarding, Rig, Safety, Sharing, make_rig
 from swarmscope.onboard.scans import Scans
@@ -133,7 +135,8 @@ def check_horizon(rig: Rig, dt_s: float) -> None:
         raise ConfigError("lidar.fov_deg", f"{why}; {LEAST_VIEW_DEG:g} would do, seen from the body's centre")
     speed = min(SLOWEST_MPS, rig.body.v_max_mps)
     delay, brake = dt_s + guarding.latency_s, speed * speed / (2.0 * rig.body.a_max_mps2)
-    _check_view(rig, speed, taken + speed * delay + brake, "things", guarding.thinnest_m, 0.5 * guarding.thinnest_m)
+    need = max(taken + speed * delay + brake, _kept_beside(rig) if rig.sensor.field > 0 else 0.0)
+    _check_view(rig, speed, need, "things", guarding.thinnest_m, 0.5 * guarding.thinnest_m)
     if guarding.strangers_mps > 0.0:
         gap = speed * delay + brake + guarding.strangers_mps * (delay + speed / rig.body.a_max_mps2)
         smallest = guarding.strangers_m
@@ -145,6 +148,13 @@ def check_horizon(rig: Rig, dt_s: float) -> None:
         gap = speed * delay + brake + guarding.others_mps * (delay + speed / rig.body.a_max_mps2)
     smallest = guarding.others_smallest_m
     _check_view(rig, speed, taken + gap, "robots", 2.0 * smallest, smallest)
+
+
+def _kept_beside(rig: Rig) -> float:
+    """Return how far away a robot of limited view must have seen what is beside it now, a scan kept later [m]."""
+    half = min(0.5 * math.pi, 0.5 * rig.sensor.increment * (rig.sensor.field - 1))
+    beside = rig.body.radius_m + rig.guarding.clearance_m + reaches_between(rig.body.radius_m)
+    return beside / math.sin(half) + STEP_RADII * rig.body.radius_m
 
 
 def _check_view(rig: Rig, speed: float, need: float, what: str, width: float, nearer: float) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from helpers import make_sensor, one_robot, rig_of, seen
-from swarmscope.onboard.perception.frames import in_view, keep_frame, look_back, was_free
+from swarmscope.onboard.perception.frames import in_view, keep_frame, look_back, shorten_frame, was_free
 from swarmscope.onboard.perception.mend import mend
 from swarmscope.onboard.sensor import all_round
 from swarmscope.onboard.sharing.tracks import update_odometry, update_tracks
@@ -19,6 +19,8 @@ from swarmscope.onboard.sharing.tracks import update_odometry, update_tracks
 RADIUS = 0.15
 NAN, INF = math.nan, math.inf
 SIXTY = math.radians(60.0)
+NARROW = rig_of().horizon.things
+"""Farther away 2 cm may slip between two beams."""
 
 
 def beam(degrees):
@@ -34,8 +36,8 @@ def remembered(distance):
 class Robot:
     """A robot that looks ahead only."""
 
-    def __init__(self, beams=181, fov=math.pi):
-        self.rows = one_robot(rig_of(sensor=all_round(make_sensor(beams=beams, fov=fov))))
+    def __init__(self, beams=181, fov=math.pi, **guarding):
+        self.rows = one_robot(rig_of(sensor=all_round(make_sensor(beams=beams, fov=fov)), **guarding))
         self.view = self.rows.view
 
     def look(self, returns=None, moved=(0.0, 0.0, 0.0), neighbours=()):
@@ -148,13 +150,13 @@ def test_what_was_a_neighbours_is_not_remembered_as_a_thing():
 
 
 def test_places_are_seen_free_in_view_up_to_the_return():
-    """It saw 1 m at 30 degrees and nothing at 31 degrees, and is 3 m farther now."""
+    """It saw 1 m at 30 degrees and nothing at 31 degrees, and is 3 m farther now; 2 cm do not show farther off."""
     robot = Robot()
     robot.look({30: 1.0})
     robot.look({}, (3.0, 0.0, 0.0))
-    for degrees, free_to in ((30, 1.0), (31, INF)):
+    for degrees, free_to in ((30, 1.0), (31, NARROW)):
         a = math.radians(degrees)
-        for distance in (0.5, 0.99, 1.01, 3.0):
+        for distance in (0.5, 0.99, 1.01, NARROW - 0.01, NARROW + 0.01, 3.0):
             assert robot.free(distance * math.cos(a) - 3.0, distance * math.sin(a)) == (distance < free_to)
 
 
@@ -178,14 +180,14 @@ def test_where_the_body_stands_or_stood_is_free():
 def test_nobody_knows_what_a_wide_hole_hides():
     """Broken readings: 3 degrees are bridged by the nearer of what is beside, 60 degrees block."""
     robot = Robot()
-    robot.look({59: 2.0, 60: NAN, 61: NAN, 62: 3.0} | {-d: NAN for d in range(30, 90)})
+    robot.look({59: 1.0, 60: NAN, 61: NAN, 62: 3.0} | {-d: NAN for d in range(30, 90)})
     scan = robot.view.frames.scans[0]
-    assert scan[[149, 150, 151, 152]] == pytest.approx([2.0, -2.0, -2.0, 3.0])
+    assert scan[[149, 150, 151, 152]] == pytest.approx([1.0, -1.0, -1.0, 3.0])
     assert np.isnan(scan[1:61]).all() and (scan[[0, 61]] == 5.0).all()
     robot.look({}, (2.0, 0.0, 0.0))
     a = SIXTY
-    assert robot.free(1.9 * math.cos(a) - 2.0, 1.9 * math.sin(a))
-    assert not robot.free(2.1 * math.cos(a) - 2.0, 2.1 * math.sin(a))
+    assert robot.free(0.95 * math.cos(a) - 2.0, 0.95 * math.sin(a))
+    assert not robot.free(1.05 * math.cos(a) - 2.0, 1.05 * math.sin(a))
     assert not robot.free(0.5 * math.cos(a) - 2.0, -0.5 * math.sin(a))
 
 
@@ -247,10 +249,26 @@ def test_a_full_circle_keeps_none():
 
 
 def test_beyond_the_range_nothing_was_seen_free():
-    """The range is 5 m: a scan without returns shows what is in view up to there, and not what lies behind it."""
+    """The range is 5 m: a scan without returns shows what is in view up to there, and not what lies behind it.
+
+    Narrow things show between two beams up to 1.1 m, unless nothing is narrow.
+    """
+    for thinnest_m, reach in ((0.0, 5.0), (0.02, NARROW)):
+        robot = Robot(thinnest_m=thinnest_m)
+        robot.look({}, (0.0, 0.0, 0.0))
+        robot.look({}, (0.0, 0.0, math.pi))
+        robot.look({}, (0.0, 0.0, 0.0))
+        assert robot.free(-reach + 0.1, 0.0)
+        assert not robot.free(-reach - 0.1, 0.0)
+
+
+def test_a_kept_scan_shows_no_more_of_a_hole_than_the_guard_knows_of_it():
     robot = Robot()
-    robot.look({}, (0.0, 0.0, 0.0))
-    robot.look({}, (0.0, 0.0, math.pi))
-    robot.look({}, (0.0, 0.0, 0.0))
-    assert robot.free(-4.9, 0.0)
-    assert not robot.free(-5.1, 0.0)
+    robot.look({60: NAN})
+    robot.view.hidden[:] = INF
+    robot.view.hidden[beam(60)] = 0.5
+    shorten_frame(robot.view, 0)
+    assert robot.view.frames.scans[0][[149, 150, 151]] == pytest.approx([5.0, -0.5, 5.0])
+    robot.look({}, (1.0, 0.0, 0.0))
+    assert robot.free(0.49 * math.cos(SIXTY) - 1.0, 0.49 * math.sin(SIXTY))
+    assert not robot.free(0.52 * math.cos(SIXTY) - 1.0, 0.52 * math.sin(SIXTY))
