@@ -585,7 +585,7 @@ def fault(case: Case, played: Played) -> str:
 
 def _ends(case: Case) -> tuple[int, ...]:
     """Return the exit codes that are no fault: a controller of the disk that collides or leaves it ends with 1."""
-    return (0, 1, REFUSED) if case.words[:2] == ("disk", "run") else (0, REFUSED)
+    return (0, 1, REFUSED) if case.words[:2] == ["disk", "run"] else (0, REFUSED)
 
 
 def _names_something(case: Case, said: str) -> bool:
