@@ -135,8 +135,11 @@ def check_horizon(rig: Rig, dt_s: float) -> None:
         raise ConfigError("lidar.fov_deg", f"{why}; {LEAST_VIEW_DEG:g} would do, seen from the body's centre")
     speed = min(SLOWEST_MPS, rig.body.v_max_mps)
     delay, brake = dt_s + guarding.latency_s, speed * speed / (2.0 * rig.body.a_max_mps2)
-    need = max(taken + speed * delay + brake, _kept_beside(rig) if rig.sensor.field > 0 else 0.0)
-    _check_view(rig, speed, need, "things", guarding.thinnest_m, 0.5 * guarding.thinnest_m)
+    need = taken + speed * delay + brake
+    _check_range(rig, speed, need, "things")
+    if rig.sensor.field > 0:
+        need = max(need, _kept_beside(rig))
+    _check_beams(rig, speed, need, "things", guarding.thinnest_m, 0.5 * guarding.thinnest_m)
     if guarding.strangers_mps > 0.0:
         gap = speed * delay + brake + guarding.strangers_mps * (delay + speed / rig.body.a_max_mps2)
         smallest = guarding.strangers_m
@@ -154,18 +157,32 @@ def _kept_beside(rig: Rig) -> float:
     """Return how far away a robot of limited view must have seen what is beside it now, a scan kept later [m]."""
     half = min(0.5 * math.pi, 0.5 * rig.sensor.increment * (rig.sensor.field - 1))
     beside = rig.body.radius_m + rig.guarding.clearance_m + reaches_between(rig.body.radius_m)
-    return beside / math.sin(half) + STEP_RADII * rig.body.radius_m
+    way = STEP_RADII * rig.body.radius_m if half < 0.5 * math.pi else 0.0  # since the last scan that was kept
+    return beside / math.sin(half) + way
 
 
 def _check_view(rig: Rig, speed: float, need: float, what: str, width: float, nearer: float) -> None:
     """Raise ConfigError unless ``need`` [m] lies within range, and ``width`` [m] shows between two beams there."""
-    why = f"to drive {speed:g} m/s this robot must see {what} {need:.2f} m away"
+    _check_range(rig, speed, need, what)
+    _check_beams(rig, speed, need, what, width, nearer)
+
+
+def _check_range(rig: Rig, speed: float, need: float, what: str) -> None:
+    """Raise ConfigError unless ``need`` [m] lies within range."""
     if rig.sensor.range_max < need:
-        raise ConfigError("lidar.range_m", f"{why}; {rig.sensor.range_max:g} m is too short")
+        raise ConfigError("lidar.range_m", f"{_must_see(speed, what, need)}; {rig.sensor.range_max:g} m is too short")
+
+
+def _must_see(speed: float, what: str, need: float) -> str:
+    return f"to drive {speed:g} m/s this robot must see {what} {need:.2f} m away"
+
+
+def _check_beams(rig: Rig, speed: float, need: float, what: str, width: float, nearer: float) -> None:
+    """Raise ConfigError unless ``width`` [m] shows between two beams ``need`` [m] away."""
     finest = 2.0 * math.asin(min(1.0, 0.5 * width / (need + nearer))) if width > 0.0 else math.pi
     if rig.sensor.increment > finest:
         count, least = rig.sensor.field or rig.sensor.beams, _least_beams(rig.sensor, finest)
-        raise ConfigError("lidar.beams", f"{why}; {count} are too few, {least} would do")
+        raise ConfigError("lidar.beams", f"{_must_see(speed, what, need)}; {count} are too few, {least} would do")
 
 
 def _least_beams(sensor: Sensor, finest: float) -> int:
