@@ -26,17 +26,20 @@ DT, STEPS = 0.2, 10
 class Drive:
     """A robot in a world, tick after tick; ``spoil`` may change its scans, which are ``late_s`` old."""
 
-    def __init__(self, world, lidar, start, spoil=None, late_s=0.0):
+    def __init__(self, world, lidar, start, spoil=None, late_s=0.0, v_max_mps=0.5, **options):
         self.world, self.lidar, self.spoil, self.late_s = world, lidar, spoil, late_s
-        self.robot = Robot("nav-scope", Body(), lidar, address=1)
+        self.robot = Robot("nav-scope", Body(v_max_mps=v_max_mps), lidar, address=1, **options)
         self.robot.warm_up()
         self.x, self.y, self.yaw = start
         self.now_s, self.speed, self.moved, self.least = 0.0, 0.0, (0.0, 0.0, 0.0), math.inf
         self.beams = make_beams(lidar.beams, math.radians(lidar.fov_deg), lidar.range_m)
+        self.turned = lidar.mount[2]
+        if lidar.first_deg is not None:
+            self.turned += math.radians(lidar.first_deg) - self.beams.angle_min
         self.track = [tuple(start)] * (round(late_s / DT * STEPS) + 1)
 
     def scan(self):
-        (x, y, yaw), (mx, my, turned) = self.track[0], self.lidar.mount
+        (x, y, yaw), (mx, my, _), turned = self.track[0], self.lidar.mount, self.turned
         c, s, found = math.cos(yaw), math.sin(yaw), np.empty(self.lidar.beams, np.float32)
         cast_static(self.world, x + c * mx - s * my, y + s * mx + c * my, yaw + turned, self.beams, found)
         if self.spoil is not None:
@@ -168,6 +171,45 @@ def test_a_post_that_gives_no_sound_reading_is_not_touched(fov, mount, late_s, y
     world, spoil = circles_world([(1.2, y, 0.01)]), blind_at_returns(first, count)
     drive = Drive(world, lidar, (0.0, 0.0, 0.0), spoil, late_s)
     for _ in range(45):
+        drive.tick(4.0, 0.0)
+    assert drive.least > 0.0
+
+
+@pytest.mark.parametrize("v_max_mps", [1.0, 2.0])
+def test_a_circle_that_closes_ahead_with_a_wider_gap_lets_its_robot_be_slower(v_max_mps):
+    """180 readings over 357.2 degrees, from 1.4 degrees to the left on: a post ahead shows 0.4 m away, not 0.57."""
+    lidar = Lidar(beams=180, fov_deg=357.2, first_deg=1.4)
+    drive = Drive(circles_world([(1.2, 0.0, 0.01)]), lidar, (0.0, 0.0, 0.0), v_max_mps=v_max_mps, others_mps=0.0)
+    assert drive.robot.rows.rig.horizon.things == pytest.approx(0.01 / math.sin(math.radians(1.4)) - 0.01)
+    for _ in range(150):
+        drive.tick(4.0, 0.0)
+    assert drive.least > 0.0
+    assert drive.x > 3.9
+
+
+def absorb(scan):
+    """Spoil scans as things do that give no reading at all."""
+    scan[np.isfinite(scan)] = np.nan
+
+
+@pytest.mark.parametrize("v_max_mps", [0.2, 0.5])
+@pytest.mark.parametrize(("x", "y"), [(1.0, -0.2), (1.2, -0.04), (1.4, 0.08), (1.6, 0.0), (2.0, 0.16), (2.4, -0.08)])
+def test_a_post_that_gives_no_reading_at_all_is_gone_round(x, y, v_max_mps):
+    """The hole is as wide as the post; while the robot drives by fractions of a beam it may slip from beam to beam."""
+    drive = Drive(circles_world([(x, y, 0.01)]), Lidar(), (0.0, 0.0, 0.0), absorb, v_max_mps=v_max_mps)
+    for _ in range(round(8.0 / v_max_mps / DT)):
+        drive.tick(4.0, 0.0)
+    assert drive.least > 0.0
+    assert drive.x > 3.9
+
+
+@pytest.mark.parametrize(("x", "y"), [(1.0, 0.0), (1.3, 0.1)])
+@pytest.mark.parametrize(("fov", "late_s"), [(180.0, 0.0), (120.0, 0.0), (120.0, 0.2), (90.0, 0.1)])
+def test_nor_is_it_touched_by_robots_of_limited_view(fov, late_s, x, y):
+    """What comes into view in a turn had been taken for looked at: beams out of view only remember."""
+    lidar = Lidar(beams=int(fov) + 1, fov_deg=fov)
+    drive = Drive(circles_world([(x, y, 0.01), (2.0, -0.3, 0.02)]), lidar, (0.0, 0.0, 1.0), absorb, late_s)
+    for _ in range(90):
         drive.tick(4.0, 0.0)
     assert drive.least > 0.0
 

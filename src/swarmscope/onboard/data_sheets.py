@@ -8,7 +8,7 @@ from typing import Any
 
 from swarmscope.errors import ConfigError, UnknownNameError
 from swarmscope.onboard.body import Body, protection_model
-from swarmscope.onboard.control.horizon import Horizon
+from swarmscope.onboard.control.horizon import Horizon, horizon_of
 from swarmscope.onboard.control.unseen import reaches_between
 from swarmscope.onboard.edge import ADDRESSES, short
 from swarmscope.onboard.lidar import LEAST_VIEW_DEG, Lidar, finite, sensor_of, sweep_s
@@ -106,7 +106,9 @@ def rig_of(body: Body, lidar: Lidar, scans: Scans, options: Mapping[str, Any]) -
     if guarding.strangers_mps > 0.0 and lidar.masks_deg:
         raise ConfigError("lidar.masks_deg", "somebody may come where this LiDAR is masked: strangers_mps 0 would do")
     rig = make_rig(body, all_round(sensor_of(lidar, scans.grid)), guarding, safety, sharing)
-    return rig._replace(horizon=Horizon(*(max(0.0, reach - offset) for reach in rig.horizon)))  # it is the sensor's
+    taken = rig.guarding
+    horizon = horizon_of(taken.others_smallest_m, taken.strangers_m, rig.sensor, taken.thinnest_m, scans.gap)
+    return rig._replace(horizon=Horizon(*(max(0.0, reach - offset) for reach in horizon)))  # it is the sensor's
 
 
 def _part(kind: Any, options: Mapping[str, Any]) -> Any:

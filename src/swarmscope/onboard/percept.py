@@ -144,8 +144,12 @@ SHARED = np.dtype(
         ("compass", np.float64),  # of the last tick
         ("view_first", np.int64),  # beams of a limited field of view between which something is known
         ("view_last", np.int64),
+        ("was_first", np.int64),  # those of the last tick
+        ("was_last", np.int64),
         ("unseen_left", np.uint8),  # on which side of the way something has not been seen
         ("look_rad", np.float64),  # what is left of a look round [rad]
+        ("looked_s", np.float64),  # when it last began to look where a hole of its scan is
+        ("wary_s", np.float64),  # until then planners are shown as a thing what a hole may hide
         ("frames_n", np.int64),  # scans that it has kept
         ("frame_at", np.int64),  # the newest of them
         ("losses", np.float64),  # share of returns that get lost from scan to scan
@@ -164,6 +168,6 @@ def new_shared(robots: int) -> np.ndarray:
     shared = np.zeros(robots, SHARED)
     for name in ("track_id", "heard_id", "sender_id", "window_boot", "trial_boot", "asked_seq", "asked_id"):
         shared[name] = -1
-    for name in ("asked_s", "window_s", "quota_s"):
+    for name in ("asked_s", "window_s", "quota_s", "looked_s", "wary_s"):
         shared[name] = NEVER_S
     return shared

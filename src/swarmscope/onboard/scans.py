@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from swarmscope.errors import ConfigError
-from swarmscope.geometry import Pose
+from swarmscope.geometry import TWO_PI, Pose
 from swarmscope.onboard.edge import Unusable, number, readings, short
 from swarmscope.onboard.lidar import Layout, Lidar, grid_of, lay_out, layout_of, same_rays, seen_from_above, sweep_s
 from swarmscope.onboard.perception.reproject import NEAR_M, NEAR_STEPS, Found, Grid, settle
@@ -73,6 +73,12 @@ class Scans:
         self._scan = np.empty(self._sheet.order.size, np.float32)
         self._rig: Rig
         self.forget()
+
+    @property
+    def gap(self) -> float:
+        """How far apart the first and the last reading of a closed circle are [rad]; 0 of an open one."""
+        rays = self._sheet.rays
+        return TWO_PI - rays.increment * (self._sheet.order.size - 1) if rays.closed else 0.0
 
     def build_in(self, rig: Rig) -> None:
         """Let scans be those of a robot with ``rig``."""

@@ -87,7 +87,8 @@ def test_a_hole_where_the_circle_closes_is_one_hole():
 def test_out_of_a_limited_view_the_last_scan_has_not_looked():
     rig = rig_of(sensor=all_round(make_sensor(beams=181, fov=math.pi)))
     rows = one_robot(rig)
-    rows.shared["view_first"], rows.shared["view_last"] = 89, 269
+    for name, beam in (("view_first", 89), ("view_last", 269), ("was_first", 89), ("was_last", 269)):
+        rows.shared[name] = beam
     turn = (0.0, 0.0, 30.0 * DEGREE)
     assert after(scan_of(), scan_of(265, 200), moved=turn, rows=rows) == [265]
 
@@ -114,6 +115,18 @@ def test_of_a_hole_that_stays_as_much_is_known_as_was_looked_at_before():
         flagged = after(hole, moved=(0.1, 0.0, 0.0), rows=rows)
     assert 180 in flagged
     assert rows.view.hidden[180] == pytest.approx(shows_beside(5, rows.rig), abs=0.02)
+
+
+def test_both_beams_beside_a_place_must_have_looked_there():
+    """After a turn by half a beam the place of beam 180 lies between two; one of them ended before it."""
+    turn = (0.0, 0.0, 0.5 * DEGREE)
+    for blocked in (180, 181):
+        near = scan_of()
+        near[blocked] = 0.3
+        assert after(near, scan_of(180), moved=turn) == [180]
+    near = scan_of()
+    near[[179, 182]] = 0.3
+    assert after(near, scan_of(180), moved=turn) == []
 
 
 def test_a_post_that_slips_between_two_beams_has_not_been_looked_past():

@@ -43,7 +43,7 @@ CREEP = 0.4
 """Where somebody may come who does not yield the slowest speed but 0 is slower by this: it may be all that passes."""
 LEAST_MPS = 1e-3
 """There what is slower than this stands."""
-HARDLY = 0.25
+HARDLY = 0.5
 """A robot that a hole of its scan lets drive no faster than this share of what it wants rather stands, and looks."""
 FREE = -1
 STANDS_MPS = 1e-6

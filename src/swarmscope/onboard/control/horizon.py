@@ -8,6 +8,9 @@ from typing import NamedTuple
 from swarmscope._jit import jit, jit_inline
 from swarmscope.onboard.sensor import Sensor
 
+WIDER = 1.001
+"""A gap that is no wider than so many increments is one."""
+
 
 class Horizon(NamedTuple):
     """How near things can be without having been seen [m], from the robot's centre to their surface."""
@@ -20,15 +23,23 @@ class Horizon(NamedTuple):
     """Those that do not yield, the smallest of them."""
 
 
-def horizon_of(smallest_m: float, strangers_m: float, sensor: Sensor, thinnest_m: float) -> Horizon:
+def horizon_of(
+    smallest_m: float, strangers_m: float, sensor: Sensor, thinnest_m: float, gap: float = 0.0
+) -> Horizon:
     """Return the horizon of a sensor: its range, or nearer where something fits between two beams.
 
-    ``smallest_m`` and ``strangers_m`` are the radii of the smallest other robot, and of the smallest that does not
-    yield [m].
+    The first and the last of a circle may be farther apart than the others, ``gap`` [rad] if it says more than the
+    sensor. ``smallest_m`` and ``strangers_m`` are the radii of the smallest other robot, and of the smallest that does
+    not yield [m].
     """
-    if sensor.increment >= math.pi:
+    apart = sensor.increment
+    if sensor.wraps and sensor.field == 0:
+        gap = max(gap, 2.0 * math.pi - (sensor.beams - 1) * sensor.increment)
+    if gap > WIDER * apart:
+        apart = gap
+    if apart >= math.pi:
         return Horizon(0.0, 0.0, 0.0)
-    between = 2.0 * math.sin(0.5 * sensor.increment)
+    between = 2.0 * math.sin(0.5 * apart)
     things = thinnest_m / between - 0.5 * thinnest_m if thinnest_m > 0.0 else math.inf
     robots = 2.0 * smallest_m / between - smallest_m
     strangers = 2.0 * strangers_m / between - strangers_m

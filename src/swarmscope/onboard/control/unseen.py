@@ -15,6 +15,8 @@ LOOK_SHARE = 0.4
 """Of what it sees of its field of view, by which a robot that looks round turns in a tick."""
 ASIDE_RAD = 0.2
 """By so much a robot that sees all round turns in a tick to look where a hole of its scan is."""
+AGAIN_S, WARY_S = 2.0, 10.0
+"""A hole that holds a robot again within so long is shown to its planner as a thing, for so long."""
 FRONT_RAD = 1.8
 """The front of the body is looked at up to this angle to either side [rad], ..."""
 GRAIN_M = 0.02
@@ -53,7 +55,8 @@ def look_round(see: View, v: float, w: float, why: int) -> tuple[float, float, i
     """Return the command of a robot that stands, and why: it turns to look at what keeps it from driving.
 
     With a limited view it turns once round where it has not seen what is beside its way, so slowly that scans overlap.
-    Where a hole of the scan may hide something it turns until the hole has moved on by its own width.
+    Where a hole of the scan may hide something it turns until the hole has moved on by its own width; if it is there
+    again soon, it may be a thing that gives no sound reading, and planners are to go round it.
     """
     shared, field = see.shared, see.rig.sensor.increment * see.rig.sensor.field
     if shared["look_rad"] > 0.0:
@@ -62,6 +65,9 @@ def look_round(see: View, v: float, w: float, why: int) -> tuple[float, float, i
         shared["look_rad"] = 2.0 * math.pi - 0.5 * field
     elif why == R_HELD_HOLE and v == 0.0:
         shared["look_rad"], shared["unseen_left"] = _hidden_rad(see), w >= 0.0
+        if see.percept["now_s"] - shared["looked_s"] < AGAIN_S:
+            shared["wary_s"] = see.percept["now_s"] + WARY_S
+        shared["looked_s"] = see.percept["now_s"]
     if not shared["look_rad"] > 0.0:
         return v, w, why
     seen = see.rig.sensor.increment * (shared["view_last"] - shared["view_first"] + 1)  # less while late scans turn

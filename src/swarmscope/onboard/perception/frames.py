@@ -44,6 +44,7 @@ def look_back(see: View) -> None:
         first += 1
     while last > first and not see.scan[last] >= 0.0:
         last -= 1
+    shared["was_first"], shared["was_last"] = shared["view_first"], shared["view_last"]
     shared["view_first"], shared["view_last"] = first, last
     for n in range(sensor.beams):
         if not first <= n <= last:
@@ -243,11 +244,19 @@ def was_free(see: View, x: float, y: float) -> bool:
             return True
         if away + off > shows:
             continue
-        n = nearest_beam(px, py, pose[2], sensor) - sensor.first
+        scan, n = see.frames.scans[k], nearest_beam(px, py, pose[2], sensor) - sensor.first
         aside = int(math.ceil(off / max(away, 1e-9) / sensor.increment)) if off > 0.0 else 0
-        if aside <= n < sensor.field - aside and _all_reach(see.frames.scans[k], n - aside, n + aside, away + off):
+        if not (aside <= n < sensor.field - aside and _all_reach(scan, n - aside, n + aside, away + off)):
+            continue
+        if _no_hole_at(scan, n - aside - 1, away + off) and _no_hole_at(scan, n + aside + 1, away + off):
             return True
     return False
+
+
+@jit_inner
+def _no_hole_at(scan: np.ndarray, n: int, far: float) -> bool:
+    """Tell whether nothing is hidden at beam n of a kept scan nearer than ``far`` [m], where it might reach beside."""
+    return bool(not 0 <= n < scan.size or scan[n] >= 0.0 or -scan[n] >= far)
 
 
 @jit_inner

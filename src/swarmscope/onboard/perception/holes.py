@@ -9,10 +9,9 @@ import math
 
 from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.geometry import then
-from swarmscope.onboard.perception.beams import beam_at, nearest_beam
-from swarmscope.onboard.perception.frames import astray, in_view, narrow_shows_up_to
+from swarmscope.onboard.perception.beams import beam_at
+from swarmscope.onboard.perception.frames import astray, narrow_shows_up_to
 from swarmscope.onboard.perception.mend import shows_beside
-from swarmscope.onboard.sensor import Sensor
 from swarmscope.onboard.view import View
 
 BROKEN, LOOKED_THROUGH = 1, 2
@@ -75,56 +74,57 @@ def _looked_up_to(see: View, n: int, reach: float) -> float:
 
     That is up to where what is narrow would show between two beams, farther than which no robot relies on its eyes.
     """
-    far, known, before = min(float(see.scan[n]), narrow_shows_up_to(see)), 0.0, -1
+    far, known, before = min(float(see.scan[n]), narrow_shows_up_to(see)), 0.0, math.nan
     if reach >= far:
         return math.inf
-    middle = _looked_at(see, n, reach, before)
-    if middle < 0:
+    at = _looked_at(see, n, reach, before)
+    if math.isnan(at):
         return reach
-    while middle >= 0:
+    while not math.isnan(at):
         if reach >= far:
             return math.inf
-        known, before = reach, middle
+        known, before = reach, at
         reach = min(FARTHER * reach, far)
-        middle = _looked_at(see, n, reach, before)
+        at = _looked_at(see, n, reach, before)
     for _ in range(FINER):
         place = 0.5 * (known + reach)
-        middle = _looked_at(see, n, place, before)
-        if middle < 0:
+        at = _looked_at(see, n, place, before)
+        if math.isnan(at):
             reach = place
         else:
-            known, before = place, middle
+            known, before = place, at
     return known
 
 
 @jit_inner
-def _looked_at(see: View, n: int, reach: float, before: int) -> int:
-    """Return which beam of the last scan has looked at the place ``reach`` [m] along beam n; -1: none has for sure.
+def _looked_at(see: View, n: int, reach: float, before: float) -> float:
+    """Return where among the last scan's beams the place ``reach`` [m] along beam n was, NaN unless they looked there.
 
-    Every beam that may have, and those from beam ``before`` on if there is one, must have reached as far, and what is
-    narrow must show there.
+    Both beams beside the place must have reached as far, since what is narrow may be met by one of them alone; where
+    wheels err all that may be beside it, and those from ``before`` on if that is no NaN; and what is narrow must show.
     """
-    rig, percept = see.rig, see.percept
+    rig, percept, sensor = see.rig, see.percept, see.rig.sensor
     here = (percept["odom_x"], percept["odom_y"], percept["odom_yaw"])
     x, y, _ = then(here, (reach * rig.cos[n], reach * rig.sin[n], 0.0))
-    if rig.sensor.field > 0 and not in_view(x, y, see):
-        return -1
-    distance, middle = math.sqrt(x * x + y * y), nearest_beam(x, y, 0.0, rig.sensor)
+    distance = math.sqrt(x * x + y * y)
     off = astray(math.sqrt(here[0] ** 2 + here[1] ** 2), abs(here[2]), distance, rig)
-    aside = int(math.ceil(off / max(distance, 1e-9) / rig.sensor.increment))
-    since = _from_beam(before, middle, rig.sensor) if before >= 0 else 0
+    at = (math.atan2(y, x) - sensor.angle_min) / sensor.increment
+    since = 0.0 if math.isnan(before) else before - at
+    if sensor.wraps and abs(since) > 0.5 * sensor.beams:
+        since -= math.copysign(sensor.beams, since)
+    aside = off / max(distance, 1e-9) / sensor.increment
+    first = int(math.floor(at + min(0.0, since) - aside + ROUNDING))
+    last = int(math.ceil(at + max(0.0, since) + aside - ROUNDING))
     far = (distance + off) * (1.0 - ROUNDING)
-    looked = far <= narrow_shows_up_to(see)
-    for m in range(middle + min(0, since) - aside, middle + max(0, since) + aside + 1):
-        k = beam_at(m, rig.sensor)
-        looked &= k < 0 or abs(see.kept[k]) >= far
-    return middle if looked else -1
+    looked = far <= narrow_shows_up_to(see) and _was_in_view(see, first, last)
+    for m in range(first, last + 1):
+        k = beam_at(m, sensor)
+        looked &= k >= 0 and abs(see.kept[k]) >= far
+    return at if looked else math.nan
 
 
-@jit_inner
-def _from_beam(before: int, beam: int, sensor: Sensor) -> int:
-    """Return how many beams ``before`` lies before ``beam``, below 0, or after it, the shorter way round a circle."""
-    since = before - beam
-    if sensor.wraps and abs(since) > sensor.beams // 2:
-        since -= sensor.beams if since > 0 else -sensor.beams
-    return since
+@jit_inline
+def _was_in_view(see: View, first: int, last: int) -> bool:
+    """Tell whether the last scan has measured with all these beams; out of view it only remembers."""
+    shared = see.shared
+    return bool(see.rig.sensor.field == 0 or (shared["was_first"] <= first and last <= shared["was_last"]))

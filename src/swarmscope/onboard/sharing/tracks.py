@@ -198,13 +198,16 @@ def _nearest_to(see: View, x: float, y: float) -> float:
 @jit_inline
 def mask_moving_neighbours(see: View, still_s: float) -> None:
     """Copy the scan into ``see.masked`` without the returns of neighbours that move (no return instead), nor those that
-    are kept for the guard alone.
+    are kept for the guard alone; where the robot is wary with what holes may hide.
 
     Moving neighbours are kept apart from by the yield rule and the guard; taken for obstacles they would
     make every robot turn off behind every other. One that has stood for ``still_s`` stays in: it is an obstacle.
     """
     for n in range(see.rig.sensor.beams):
         see.masked[n] = np.inf if see.unseen[n] >= GUARD_ALONE else see.scan[n]
+    if see.percept["now_s"] < see.shared["wary_s"]:
+        for n in range(see.rig.sensor.beams):
+            see.masked[n] = min(see.masked[n], see.hidden[n])
     for t in range(PEERS):
         if moves(see.percept, see.shared, t, still_s):
             returns_of(see, t, True)
