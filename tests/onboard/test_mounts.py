@@ -181,10 +181,10 @@ def test_a_circle_that_closes_ahead_with_a_wider_gap_lets_its_robot_be_slower(v_
     lidar = Lidar(beams=180, fov_deg=357.2, first_deg=1.4)
     drive = Drive(circles_world([(1.2, 0.0, 0.01)]), lidar, (0.0, 0.0, 0.0), v_max_mps=v_max_mps, others_mps=0.0)
     assert drive.robot.rows.rig.horizon.things == pytest.approx(0.01 / math.sin(math.radians(1.4)) - 0.01)
-    for _ in range(150):
+    for _ in range(30):
         drive.tick(4.0, 0.0)
     assert drive.least > 0.0
-    assert drive.x > 3.9
+    assert drive.x > 1.3
 
 
 def absorb(scan):
