@@ -111,7 +111,7 @@ def filter_us() -> float:
     for _ in range(REPEATS):
         start = time.perf_counter_ns()
         for scan in scans:
-            prepare_scan(scan, 0.0, 5.0, True, rig.half, scratch.padded[0])
+            prepare_scan(scan, 0.0, 5.0, True, rig.taps.size // 2, scratch.padded[0])
             filter_padded(scratch.padded[0], rig.taps, 5.0, scratch.filtered[0])
         best = min(best, (time.perf_counter_ns() - start) / 1e3 / ROBOTS)
     return best

@@ -165,9 +165,9 @@ def safe_of(rig: Rig, ranges: np.ndarray, rule: int = AHEAD) -> np.ndarray:
 def features_of(rig: Rig, ranges: np.ndarray, safe: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the filtered scan and the angles and distances of its features."""
     sensor = rig.sensor
-    padded = np.zeros(ranges.size + 2 * rig.half, np.float32)
+    padded = np.zeros(ranges.size + 2 * (rig.taps.size // 2), np.float32)
     filtered = np.zeros(ranges.size, np.float32)
-    prepare_scan(ranges, sensor.range_min, sensor.range_max, sensor.wraps, rig.half, padded)
+    prepare_scan(ranges, sensor.range_min, sensor.range_max, sensor.wraps, rig.taps.size // 2, padded)
     filter_padded(padded, rig.taps, sensor.range_max, filtered)
     angles, distances = np.zeros(16), np.zeros(16)
     n = extrema(filtered, safe.astype(np.uint8), sensor, angles, distances)

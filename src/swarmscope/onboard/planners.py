@@ -8,6 +8,7 @@ runs once a tick for each robot between perception and guard (``tick.py``). It m
 ``REASONS``             words of its own for why a robot does what it does; their codes begin at ``reasons.FIRST_OWN``
 ``VARIANTS``            planners that differ from it by fixed parameters: a mapping of names to ``Variant``
 ``decide_all(first, last, swarm, memories, params)``  instead of ``decide``: all robots at once, for libraries
+``FEATURE_MASK``        which extrema its document masks (``features.MASK_MAXIMA`` unless it says so)
 ``check_available()``   raises an error where a library or a model is missing
 ``MODELS``              of planners that run a network: the ``network.model.Model`` of each, which ``decide_all`` is
                         given after ``params``
@@ -30,6 +31,7 @@ from swarmscope.errors import ConfigError, InputFileError
 from swarmscope.held import Held
 from swarmscope.members import Kind, Need, check, find, is_text, load, names_of, text
 from swarmscope.onboard.loops import Step, batch_step, compiled_step, is_compiled, plain_step
+from swarmscope.onboard.perception.features import MASK_ALL, MASK_MAXIMA, UNMASKED
 from swarmscope.onboard.reasons import REASON_NAMES, STATE_NAMES
 from swarmscope.onboard.tick import guard_all, perceive_all
 from swarmscope.onboard.view import Swarm
@@ -111,6 +113,11 @@ class Planner:
         make = getattr(self.module, "new_memory", None)
         memory: np.ndarray = np.zeros(robots, getattr(self.module, "MEMORY", NOTHING)) if make is None else make(robots)
         return memory
+
+    @property
+    def feature_mask(self) -> int:
+        """Which extrema of a scan count in safe directions only, as its document has it (7)."""
+        return int(getattr(self.module, "FEATURE_MASK", MASK_MAXIMA))
 
     @property
     def reasons(self) -> tuple[str, ...]:
@@ -217,6 +224,7 @@ def _is_params(value: Any) -> bool:
     return isinstance(value, type) and issubclass(value, tuple) and hasattr(value, "_field_defaults")
 
 
+MASKS = (UNMASKED, MASK_MAXIMA, MASK_ALL)
 KIND = Kind(
     word="planner",
     package="swarmscope.onboard.planning",
@@ -229,6 +237,7 @@ OPTIONAL = (
     Need("decide", "a function (see, memory, params)", lambda v: _takes(v, 3)),
     Need("decide_all", "a function (first, last, swarm, memories, params)", lambda v: _takes(v, 5) or _takes(v, 6)),
     Need("new_memory", "a function (robots)", callable),
+    Need("FEATURE_MASK", "one of features.UNMASKED, MASK_MAXIMA, MASK_ALL", lambda v: v in MASKS),
     Need("REASONS", "a tuple of texts", lambda v: isinstance(v, tuple) and all(map(is_text, v))),
 )
 

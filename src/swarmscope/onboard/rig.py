@@ -10,7 +10,8 @@ import numpy as np
 from swarmscope._jit import jit_inline
 from swarmscope.onboard.body import Body, Protection, protection_model
 from swarmscope.onboard.control.horizon import Horizon, horizon_of
-from swarmscope.onboard.perception.filters import feature_filter, window_half
+from swarmscope.onboard.perception.features import MASK_MAXIMA
+from swarmscope.onboard.perception.filters import feature_filter, printed_filter, window_half
 from swarmscope.onboard.perception.safety import Rule, reach_table
 from swarmscope.onboard.sensor import Sensor
 
@@ -80,6 +81,11 @@ class Sharing(NamedTuple):
     """Send float32 features instead of quantised ones (to measure what quantisation costs)."""
     max_age_s: float = 1.5
     """Features older than this are not used."""
+    feature_mask: int = -1
+    """Which extrema count in safe directions only: ``features.UNMASKED``, ``MASK_MAXIMA`` or ``MASK_ALL``; -1: as the
+    planner's document has it."""
+    printed_filter: bool = False
+    """Whether filter (6) has as many taps as a scan has beams, as printed."""
 
 
 STRANGERS_M = 0.2
@@ -163,12 +169,17 @@ def make_rig(
         footprint=footprint,
         horizon=horizon_of(resolved.others_smallest_m, resolved.strangers_m, sensor, guarding.thinnest_m),
         guarding=resolved,
-        sharing=Sharing(bool(sharing.exact_features), float(sharing.max_age_s)),
+        sharing=Sharing(
+            exact_features=bool(sharing.exact_features),
+            max_age_s=float(sharing.max_age_s),
+            feature_mask=int(sharing.feature_mask) if sharing.feature_mask >= 0 else MASK_MAXIMA,
+            printed_filter=bool(sharing.printed_filter),
+        ),
         look_ahead=float(safety.look_ahead_m),
         reach=np.array(reach),
         cos=np.cos(angles),
         sin=np.sin(angles),
-        taps=feature_filter(half),
+        taps=printed_filter(half, sensor.beams) if sharing.printed_filter else feature_filter(half),
     )
 
 

@@ -102,7 +102,7 @@ class Robot:
         self.address, self.rate_hz = check_address(address), check_rate(rate_hz)
         self.params = self._planner.params(params)
         self._next_boot = check_boot(options.pop("boot", None))
-        self._options = options_of(options)
+        self._options = options_of({"feature_mask": self._planner.feature_mask} | options)
         self._period_s = 1.0 / self.rate_hz
         self.faults: Counter[str] = Counter()
         """How often what could not be used."""

@@ -12,7 +12,7 @@ from swarmscope.onboard.control.guard import guard
 from swarmscope.onboard.perception.bearings import steady
 from swarmscope.onboard.perception.clock import keep_time
 from swarmscope.onboard.perception.faulty import leave_out_faulty
-from swarmscope.onboard.perception.features import align_features, extrema
+from swarmscope.onboard.perception.features import UNMASKED, align_features, extrema, what_counts
 from swarmscope.onboard.perception.filters import filter_padded, prepare_scan
 from swarmscope.onboard.perception.frames import keep_frame, look_back, shorten_frame
 from swarmscope.onboard.perception.lost import keep_lost
@@ -74,13 +74,16 @@ def own_features(see: View) -> int:
 
     Their mask is the printed rule (3): the look-ahead would hide whatever is near.
     """
-    sensor = see.rig.sensor
-    safe_directions(see.masked, sensor, see.reach[PRINTED], see.edges, see.narrow)
+    sensor, mask = see.rig.sensor, see.rig.sharing.feature_mask
+    if mask != UNMASKED:
+        safe_directions(see.masked, sensor, see.reach[PRINTED], see.edges, see.narrow)
+    what_counts(mask, see.narrow)
     if sensor.field > 0:
         for n in range(sensor.beams):  # what is only remembered is not told
             if not see.shared["view_first"] <= n <= see.shared["view_last"]:
                 see.narrow[n] = 0
-    prepare_scan(see.masked, sensor.range_min, sensor.range_max, sensor.wraps, see.rig.half, see.padded)
+    half = see.rig.taps.size // 2
+    prepare_scan(see.masked, sensor.range_min, sensor.range_max, sensor.wraps, half, see.padded)
     filter_padded(see.padded, see.rig.taps, sensor.range_max, see.filtered)
     count = extrema(see.filtered, see.narrow, sensor, see.other.angles, see.other.distances)
     own, raw = see.own, see.other

@@ -168,7 +168,7 @@ def new_swarm(robots: int, rig: Rig) -> Swarm:
         rig=rig,
         narrow=np.zeros((robots, beams), np.uint8),
         edges=np.zeros((robots, beams + 1), np.int16),
-        padded=np.zeros((robots, beams + 2 * rig.half), np.float32),
+        padded=np.zeros((robots, beams + 2 * (rig.taps.size // 2)), np.float32),
         filtered=np.zeros((robots, beams), np.float32),
         other=_table(robots),
         header=np.zeros((robots, len(HEADER_FIELDS)), np.int64),

@@ -249,6 +249,16 @@ class SafetyModel(_Strict):
     """Above it they follow the present speed in steps of this; 0: those of the top speed, as printed [m/s]."""
 
 
+class FeaturesModel(_Strict):
+    """Features (7): the extrema of the filtered scan that neighbours are told."""
+
+    mask: Literal["planner", "none", "maxima", "all"] = "planner"
+    """Which of them count only in safe directions: ``maxima`` (a narrow gap is no way), ``none``, or ``all``, with the
+    obstacles that force a decision; ``planner``: as its document has it, ``none`` for SFM-MAS, else ``maxima``."""
+    filter: Literal["lobe", "printed"] = "lobe"
+    """Filter (6): ``lobe`` has T_c + 1 taps, the main lobe of the sinc, ``printed`` as many as a scan has beams."""
+
+
 class TaskModel(_Strict):
     """A task by name, with its options."""
 
@@ -338,6 +348,8 @@ class Scenario(_Strict):
     """Distances kept free around the body."""
     safety: SafetyModel = SafetyModel()
     """Which directions are safe."""
+    features: FeaturesModel = FeaturesModel()
+    """What neighbours are told of a scan."""
     limit_s: Annotated[float, Field(ge=1e-3, le=1e6), NUMBER] = Setting.limit_s
     """Simulated time after which the run ends; it ends earlier when all have arrived or collided [s]."""
     substeps: Annotated[int, Field(ge=1, le=1000), NUMBER] = Setting.substeps

@@ -287,7 +287,7 @@ def new_sim(
     robots["arrival_s"] = np.nan
     robots["min_clearance"] = np.inf
     robots["clearance"] = np.inf
-    swarm = new_swarm(n, max((rig, *start.rigs), key=lambda one: one.half))
+    swarm = new_swarm(n, max((rig, *start.rigs), key=lambda one: one.taps.size))
     swarm.percepts["dt_s"] = clock.dt
     fastest = max(body.v_max_mps for body in bodies)
     clock = clock._replace(substeps=enough_substeps(clock, fastest, max(body.w_max_radps for body in bodies)))

@@ -12,7 +12,17 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from helpers import circles_world, make_sensor, rig_of, scan_at
-from swarmscope.onboard.perception.features import align_features, extrema, reconstruct
+from swarmscope.onboard.perception.features import (
+    MASK_ALL,
+    MASK_MAXIMA,
+    MAXIMA,
+    MINIMA,
+    UNMASKED,
+    align_features,
+    extrema,
+    reconstruct,
+    what_counts,
+)
 from swarmscope.onboard.perception.filters import filter_padded, prepare_scan
 from swarmscope.onboard.sharing.message import MAX_FEATURES
 
@@ -20,15 +30,16 @@ TWO_PI = 2.0 * math.pi
 RANGE_MAX = 5.0
 
 
-def find(values, safe=None, wraps=True, room=MAX_FEATURES):
+def find(values, safe=None, wraps=True, room=MAX_FEATURES, mask=MASK_ALL):
     """Extrema of a filtered scan as [(beam, distance)], beams counted from angle_min."""
     values = np.asarray(values, np.float32)
     increment = TWO_PI / len(values) if wraps else math.radians(1.0)
     sensor = make_sensor(len(values), range_max=RANGE_MAX)
     sensor = sensor._replace(angle_min=-math.pi, increment=increment, wraps=wraps)
-    safe = np.ones(len(values), np.uint8) if safe is None else np.asarray(safe, np.uint8)
+    counts = np.ones(len(values), np.uint8) if safe is None else np.asarray(safe, np.uint8)
+    what_counts(mask, counts)
     angles, distances = np.full(room, np.nan), np.full(room, np.nan)
-    count = extrema(values, safe, sensor, angles, distances)
+    count = extrema(values, counts, sensor, angles, distances)
     assert np.isnan(angles[count:]).all()
     assert (np.diff(angles[:count]) > 0.0).all()
     beams = (angles[:count] + math.pi) / increment
@@ -66,9 +77,27 @@ def test_flat_scans_have_no_features(wraps):
     assert find(5.0 + 1e-6 * np.sin(np.arange(36)), wraps=wraps) == []
 
 
-def test_extrema_in_unsafe_directions_are_left_out():
-    safe = [1, 1, 0, 1, 1, 1, 1, 1]
-    assert find([1, 2, 3, 2, 1, 2, 4, 2], safe) == [(0, 1.0), (4, 1.0), (6, 4.0)]
+@pytest.mark.parametrize(
+    ("mask", "found"),
+    [
+        (MASK_MAXIMA, [(0, 1.0), (4, 1.0), (6, 4.0)]),
+        (MASK_ALL, [(0, 1.0), (6, 4.0)]),
+        (UNMASKED, [(0, 1.0), (2, 3.0), (4, 1.0), (6, 4.0)]),
+    ],
+)
+def test_maxima_in_unsafe_directions_are_left_out_and_minima_only_if_everything_is_masked(mask, found):
+    """A maximum at beam 2, a gap too narrow; a minimum at beam 4, the obstacle beside it."""
+    safe = [1, 1, 0, 1, 0, 1, 1, 1]
+    assert find([1, 2, 3, 2, 1, 2, 4, 2], safe, mask=mask) == found
+
+
+def test_nothing_counts_where_neither_kind_does():
+    values, none = np.array([1, 2, 3, 2, 1, 2], np.float32), np.zeros(6, np.uint8)
+    sensor = make_sensor(6, range_max=RANGE_MAX)
+    angles, distances = np.zeros(6), np.zeros(6)
+    assert extrema(values, none, sensor, angles, distances) == 0
+    assert extrema(values, none + np.uint8(MINIMA), sensor, angles, distances) == 2
+    assert extrema(values, none + np.uint8(MAXIMA), sensor, angles, distances) == 2
 
 
 def test_no_more_than_fit_are_written():

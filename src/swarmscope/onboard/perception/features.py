@@ -6,22 +6,26 @@ import math
 
 import numpy as np
 
-from swarmscope._jit import jit, jit_inner
+from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.geometry import TWO_PI, positive_angle
 from swarmscope.onboard.sensor import Sensor
 
+MINIMA, MAXIMA = 1, 2
+"""Kinds of extrema, added up: which of them count in a direction."""
+UNMASKED, MASK_MAXIMA, MASK_ALL = range(3)
+"""Which extrema count in safe directions only (`Sharing.feature_mask`): none, maxima, or minima, too."""
 FLAT = 1e-5
 """Change from beam to beam, as a fraction of the range, below which the filtered scan counts as flat."""
 
 
 @jit
 def extrema(
-    filtered: np.ndarray, safe: np.ndarray, sensor: Sensor, angles: np.ndarray, distances: np.ndarray
+    filtered: np.ndarray, counts: np.ndarray, sensor: Sensor, angles: np.ndarray, distances: np.ndarray
 ) -> int:
-    """Write the masked extrema of ``filtered (M,)`` (7) into ``angles`` [rad], ``distances`` [m]; return how many.
+    """Write the extrema of ``filtered (M,)`` (7) into ``angles`` [rad], ``distances`` [m]; return how many.
 
-    A sign change of the first difference marks an extremum; a plateau counts once, at its middle. Extrema in
-    directions that are not safe are left out (gaps too narrow for the robot). Ascending angles, sensor frame.
+    A sign change of the first difference marks an extremum; a plateau counts once, at its middle. ``counts (M,)`` uint8
+    says of which kinds they count in each direction (`what_counts`). Ascending angles, sensor frame.
     """
     beams = filtered.size
     flat = np.float32(FLAT * sensor.range_max)
@@ -47,7 +51,8 @@ def extrema(
                 beam = slope_at + 1 + (k - slope_step - 1) // 2
                 if beam >= beams:
                     beam -= beams
-                if safe[beam] and count < angles.size:
+                kind = MINIMA if sign > 0 else MAXIMA
+                if counts[beam] & kind and count < angles.size:
                     angles[count] = sensor.angle_min + beam * sensor.increment
                     distances[count] = filtered[beam]
                     count += 1
@@ -55,6 +60,22 @@ def extrema(
         n = after
     _sort_by_angle(angles, distances, count)
     return count
+
+
+@jit_inline
+def what_counts(mask: int, safe: np.ndarray) -> None:
+    """Turn ``safe (M,)`` uint8, 1 for safe directions, into the kinds of extrema that count in each of them.
+
+    Nav-SCOPE (7) masks the features by the safe directions, "to filter out narrow spaces": maxima, since a narrow gap
+    is no way. SFM-MAS (21) masks none. Minima are obstacles; to mask them, too, hides what forces a decision.
+    """
+    if mask == MASK_ALL:
+        safe *= np.uint8(MINIMA + MAXIMA)
+    elif mask == MASK_MAXIMA:
+        safe *= np.uint8(MAXIMA)
+        safe += np.uint8(MINIMA)
+    else:
+        safe[:] = MINIMA + MAXIMA
 
 
 @jit_inner

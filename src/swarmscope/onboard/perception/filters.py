@@ -36,6 +36,18 @@ def feature_filter(half: int, beta: float = KAISER_BETA) -> np.ndarray:
     return normalised
 
 
+def printed_filter(half: int, beams: int, beta: float = KAISER_BETA) -> np.ndarray:
+    """Return h_2 (6) with as many taps as a scan has ``beams``, M as printed, one less where M is even: sum 1, float32.
+
+    The window is as long as the scan, so that side lobes of the sinc stay, and filtered values below 0 occur.
+    """
+    n = np.arange(-((beams - 1) // 2), (beams - 1) // 2 + 1)
+    f_c = 1.0 / max(1, 2 * half)
+    taps = 2.0 * f_c * np.sinc(2.0 * f_c * n) * np.kaiser(n.size, beta)
+    normalised: np.ndarray = (taps / taps.sum()).astype(np.float32)
+    return normalised
+
+
 @jit
 def prepare_scan(
     ranges: np.ndarray, range_min: float, range_max: float, wraps: bool, half: int, padded: np.ndarray

@@ -25,16 +25,19 @@ from swarmscope.onboard.deciding.progress import (
 )
 from swarmscope.onboard.deciding.waiting import behind, wait
 from swarmscope.onboard.percept import Row
+from swarmscope.onboard.perception.features import UNMASKED
 from swarmscope.onboard.planners import Variant
 from swarmscope.onboard.reasons import ARRIVED, DECIDE, FOLLOW, R_FINAL, R_FREE
 from swarmscope.onboard.tick import share
 from swarmscope.onboard.view import View
 
-__all__ = ["MEMORY", "NAME", "NEEDS", "SUMMARY", "VARIANTS", "Params", "decide", "new_memory"]
+__all__ = ["FEATURE_MASK", "MEMORY", "NAME", "NEEDS", "SUMMARY", "VARIANTS", "Params", "decide", "new_memory"]
 
 NAME = "sfm-mas"
 SUMMARY = "SFM-MAS: social forces for stopping, choice of side with the neighbours asked then, and priority"
 NEEDS = "own scan, goal bearing and distance, relative poses of visible neighbours, features on request"
+FEATURE_MASK = UNMASKED
+"""(21) prints no mask."""
 VARIANTS = {
     "sfm-i": Variant(
         "SFM-MAS alone: the same forces and states, every side chosen from the robot's own scan",
