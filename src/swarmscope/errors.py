@@ -6,6 +6,9 @@ import difflib
 from collections.abc import Iterable
 from typing import Any
 
+LONGEST = 400
+"""Characters that a message repeats of a name, a place or a path."""
+
 
 class SwarmscopeError(Exception):
     """Root of all errors that a user can cause or meet; the command line prints it without a traceback."""
@@ -25,7 +28,7 @@ class UnknownNameError(SwarmscopeError):
     def __init__(self, kind: str, name: str, valid: Iterable[str], where: str = "") -> None:
         self.kind, self.name, self.valid, self.where = kind, name, sorted(valid), where
         place = f"{where}: " if where else ""
-        super().__init__(f"{place}unknown {kind} '{name}'{nearest_hint(name, self.valid)}")
+        super().__init__(f"{place}unknown {kind} '{clipped(name)}'{nearest_hint(name, self.valid)}")
 
 
 class ConfigError(SwarmscopeError):
@@ -33,7 +36,7 @@ class ConfigError(SwarmscopeError):
 
     def __init__(self, where: str, why: str) -> None:
         self.where, self.why = where, why
-        super().__init__(f"{where}: {why}")
+        super().__init__(f"{clipped(where)}: {why}")
 
 
 class InputFileError(SwarmscopeError):
@@ -41,7 +44,7 @@ class InputFileError(SwarmscopeError):
 
     def __init__(self, path: object, why: str) -> None:
         self.path, self.why = str(path), why
-        super().__init__(f"{path}: {why}")
+        super().__init__(f"{clipped(self.path)}: {why}")
 
 
 class MissingExtraError(SwarmscopeError):
@@ -70,3 +73,9 @@ def nearest_hint(name: str, valid: Iterable[str]) -> str:
     close = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
     hint = f"; did you mean '{close[0]}'?" if close else ""
     return f"{hint} (valid: {', '.join(names)})"
+
+
+def clipped(name: str) -> str:
+    """Return a name as a message repeats it: a very long one without its middle."""
+    half = LONGEST // 2
+    return name if len(name) <= LONGEST else f"{name[:half]} ... {name[-half:]}"

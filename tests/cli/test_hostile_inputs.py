@@ -51,6 +51,20 @@ def test_values_that_were_tracebacks_or_hangs_name_their_key(change, key):
 
 
 @pytest.mark.parametrize(
+    ("argv", "words"),
+    [
+        (["run", "a" * 5000 + ".yaml"], "aa.yaml: cannot be read (File name too long)"),
+        (["run", "--task", "T1", "--planner", "b" * 5000], "unknown planner"),
+        (["run", "--task", "T1", "--set", "c" * 5000 + "=1"], "cc"),
+    ],
+)
+def test_very_long_names_are_not_repeated_whole(argv, words):
+    said = refused(*argv)
+    assert words in said
+    assert len(said) < 1200
+
+
+@pytest.mark.parametrize(
     ("changes", "words"),
     [
         (["lidar.beams=4096", "lidar.fov_deg=30"], "lidar.fov_deg: 4096 beams in 30 degrees are too close"),

@@ -12,7 +12,7 @@ from swarmscope.onboard.control.horizon import Horizon, horizon_of
 from swarmscope.onboard.control.unseen import reaches_between
 from swarmscope.onboard.edge import ADDRESSES, short
 from swarmscope.onboard.lidar import LEAST_VIEW_DEG, Lidar, finite, sensor_of, sweep_s
-from swarmscope.onboard.perception.features import MASK_ALL, MASK_MAXIMA, UNMASKED
+from swarmscope.onboard.perception.features import MASKS
 from swarmscope.onboard.perception.frames import STEP_RADII
 from swarmscope.onboard.planners import Planner, load_planner
 from swarmscope.onboard.rig import GUARDING, SAFETY, SHARING, Guarding, Rig, Safety, Sharing, make_rig
@@ -48,8 +48,9 @@ def options_of(given: Mapping[str, float | None]) -> dict[str, Any]:
         checked[name] = finite(value, name)
         if checked[name] < 0.0:
             raise ConfigError(name, f"must be at least 0, not {value!r}")
-    if checked["feature_mask"] not in (-1, UNMASKED, MASK_MAXIMA, MASK_ALL):
-        raise ConfigError("feature_mask", f"must be {UNMASKED}, {MASK_MAXIMA} or {MASK_ALL}")
+    if checked["feature_mask"] not in (-1, *MASKS.values()):
+        codes = ", ".join(f"{code} ({name})" for name, code in MASKS.items())
+        raise ConfigError("feature_mask", f"must be one of {codes}")
     return checked
 
 

@@ -31,7 +31,7 @@ from swarmscope.errors import ConfigError, InputFileError
 from swarmscope.held import Held
 from swarmscope.members import Kind, Need, check, find, is_text, load, names_of, text
 from swarmscope.onboard.loops import Step, batch_step, compiled_step, is_compiled, plain_step
-from swarmscope.onboard.perception.features import MASK_ALL, MASK_MAXIMA, UNMASKED
+from swarmscope.onboard.perception.features import MASK_MAXIMA, MASKS
 from swarmscope.onboard.reasons import REASON_NAMES, STATE_NAMES
 from swarmscope.onboard.tick import guard_all, perceive_all
 from swarmscope.onboard.view import Swarm
@@ -224,7 +224,6 @@ def _is_params(value: Any) -> bool:
     return isinstance(value, type) and issubclass(value, tuple) and hasattr(value, "_field_defaults")
 
 
-MASKS = (UNMASKED, MASK_MAXIMA, MASK_ALL)
 KIND = Kind(
     word="planner",
     package="swarmscope.onboard.planning",
@@ -237,7 +236,7 @@ OPTIONAL = (
     Need("decide", "a function (see, memory, params)", lambda v: _takes(v, 3)),
     Need("decide_all", "a function (first, last, swarm, memories, params)", lambda v: _takes(v, 5) or _takes(v, 6)),
     Need("new_memory", "a function (robots)", callable),
-    Need("FEATURE_MASK", "one of features.UNMASKED, MASK_MAXIMA, MASK_ALL", lambda v: v in MASKS),
+    Need("FEATURE_MASK", "one of features.UNMASKED, MASK_MAXIMA, MASK_ALL", lambda v: v in MASKS.values()),
     Need("REASONS", "a tuple of texts", lambda v: isinstance(v, tuple) and all(map(is_text, v))),
 )
 

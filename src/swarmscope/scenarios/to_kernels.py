@@ -11,7 +11,7 @@ import numpy as np
 from swarmscope.errors import ConfigError
 from swarmscope.onboard.body import Body
 from swarmscope.onboard.data_sheets import check_horizon
-from swarmscope.onboard.perception.features import MASK_ALL, MASK_MAXIMA, UNMASKED
+from swarmscope.onboard.perception.features import MASKS
 from swarmscope.onboard.planners import Planner, load_planner
 from swarmscope.onboard.rig import Guarding, Rig, Safety, Sharing, make_rig
 from swarmscope.onboard.sensor import Sensor, all_round
@@ -114,9 +114,8 @@ def sheet_of(
 
 def _mask_of(scenario: Scenario) -> int:
     """Return which extrema count in safe directions only."""
-    named = {"none": UNMASKED, "maxima": MASK_MAXIMA, "all": MASK_ALL}
     mask = scenario.features.mask
-    return load_planner(scenario.planner.name).feature_mask if mask == "planner" else named[mask]
+    return load_planner(scenario.planner.name).feature_mask if mask == "planner" else MASKS[mask]
 
 
 def body_of(sheet: RobotModel) -> Body:

@@ -13,6 +13,7 @@ from swarmscope.onboard.sensor import Sensor
 MINIMA, MAXIMA = 1, 2
 """Kinds of extrema, added up: which of them count in a direction."""
 UNMASKED, MASK_MAXIMA, MASK_ALL = range(3)
+MASKS = {"none": UNMASKED, "maxima": MASK_MAXIMA, "all": MASK_ALL}
 """Which extrema count in safe directions only (`Sharing.feature_mask`): none, maxima, or minima, too."""
 FLAT = 1e-5
 """Change from beam to beam, as a fraction of the range, below which the filtered scan counts as flat."""
