@@ -606,6 +606,9 @@ def _names_something(case: Case, said: str) -> bool:
     }
     if re.search(r"--[a-z]|(^|\s)\S*/\S*: ", said):
         return True
+    named = re.search(r"^swarmscope: (.+?): ", said, re.MULTILINE)  # a file whose name was mutated
+    if named and any(named[1].encode() in content for content in case.files.values()):
+        return True
     return any(word in said for word in words | keys | options)
 
 
