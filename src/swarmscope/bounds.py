@@ -28,8 +28,9 @@ class Bounds(NamedTuple):
     unit: str = ""
 
 
+LONGEST_S = 100_000.0
 Metres = Annotated[float, Bounds(0.0, 1000.0, "m")]
-Seconds = Annotated[float, Bounds(0.0, 100_000.0, "s")]
+Seconds = Annotated[float, Bounds(0.0, LONGEST_S, "s")]
 Speed = Annotated[float, Bounds(0.0, 100.0, "m/s")]
 Radians = Annotated[float, Bounds(0.0, 2.0 * math.pi, "rad")]
 Degrees = Annotated[float, Bounds(0.0, 360.0, "deg")]

@@ -20,7 +20,8 @@ from swarmscope.onboard.scans import Scans
 from swarmscope.onboard.sensor import Sensor, all_round
 
 DEFAULTS: dict[str, Any] = {**GUARDING._asdict(), **SAFETY._asdict(), **SHARING._asdict()}
-"""Options of a robot, by the keys of a scenario."""
+"""Options of a robot, by the keys of a scenario; nobody can do without the guard."""
+del DEFAULTS["enabled"]
 BOOTS = 65536
 """Boot numbers."""
 
@@ -117,7 +118,7 @@ def rig_of(body: Body, lidar: Lidar, scans: Scans, options: Mapping[str, Any]) -
 
 def _part(kind: Any, options: Mapping[str, Any]) -> Any:
     """Return the options that a named tuple has."""
-    return kind(**{name: options[name] for name in kind._fields})
+    return kind(**{name: options[name] for name in kind._fields if name in options})
 
 
 SLOWEST_MPS = 0.1

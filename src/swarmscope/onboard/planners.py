@@ -8,6 +8,8 @@ runs once a tick for each robot between perception and guard (``tick.py``). It m
 ``REASONS``             words of its own for why a robot does what it does; their codes begin at ``reasons.FIRST_OWN``
 ``VARIANTS``            planners that differ from it by fixed parameters: a mapping of names to ``Variant``
 ``decide_all(first, last, swarm, memories, params)``  instead of ``decide``: all robots at once, for libraries
+``PRESETS``             keys of a scenario that hold where it says nothing (``planner.preset``): for each name a
+                        mapping such as ``{"safety.sector": True}``; ``printed`` is what the document prints
 ``FEATURE_MASK``        which extrema its document masks (``features.MASK_MAXIMA`` unless it says so)
 ``check_available()``   raises an error where a library or a model is missing
 ``MODELS``              of planners that run a network: the ``network.model.Model`` of each, which ``decide_all`` is
@@ -113,6 +115,13 @@ class Planner:
         make = getattr(self.module, "new_memory", None)
         memory: np.ndarray = np.zeros(robots, getattr(self.module, "MEMORY", NOTHING)) if make is None else make(robots)
         return memory
+
+    @property
+    def presets(self) -> dict[str, dict[str, Any]]:
+        """Its sets of keys by name, without the parameters that are fixed."""
+        fixed = {f"planner.params.{name}" for name in self.fixed}
+        every: Mapping[str, Mapping[str, Any]] = getattr(self.module, "PRESETS", {})
+        return {name: {key: keys[key] for key in keys if key not in fixed} for name, keys in every.items()}
 
     @property
     def feature_mask(self) -> int:
@@ -224,6 +233,13 @@ def _is_params(value: Any) -> bool:
     return isinstance(value, type) and issubclass(value, tuple) and hasattr(value, "_field_defaults")
 
 
+def _is_presets(value: Any) -> bool:
+    """Tell whether this is a mapping of names to mappings of keys."""
+    return isinstance(value, Mapping) and all(
+        isinstance(keys, Mapping) and all(map(is_text, (name, *keys))) for name, keys in value.items()
+    )
+
+
 KIND = Kind(
     word="planner",
     package="swarmscope.onboard.planning",
@@ -237,6 +253,7 @@ OPTIONAL = (
     Need("decide_all", "a function (first, last, swarm, memories, params)", lambda v: _takes(v, 5) or _takes(v, 6)),
     Need("new_memory", "a function (robots)", callable),
     Need("FEATURE_MASK", "one of features.UNMASKED, MASK_MAXIMA, MASK_ALL", lambda v: v in MASKS.values()),
+    Need("PRESETS", "a mapping of names to keys of a scenario and their values", _is_presets),
     Need("REASONS", "a tuple of texts", lambda v: isinstance(v, tuple) and all(map(is_text, v))),
 )
 

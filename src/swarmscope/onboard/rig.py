@@ -56,6 +56,8 @@ class Guarding(NamedTuple):
     """How fast those are that are no robots and do not yield, people; 0 and below: there are none."""
     strangers_m: float = -1.0
     """Radius of the smallest of them; 0 and below: `STRANGERS_M`."""
+    enabled: bool = True
+    """Whether there is a guard at all: simulated robots of a study may go without."""
 
 
 class Safety(NamedTuple):
@@ -215,12 +217,13 @@ def _resolved(guarding: Guarding, body: Body) -> Guarding:
     """Return plain numbers, what is not said of others filled in."""
     own = {"others_mps": body.v_max_mps, "others_smallest_m": body.radius_m, "others_largest_m": body.radius_m}
     own |= {"strangers_mps": 0.0, "strangers_m": STRANGERS_M}
-    given = {name: float(value) for name, value in guarding._asdict().items() if name != "others_yield"}
+    switches = ("others_yield", "enabled")
+    given = {name: float(value) for name, value in guarding._asdict().items() if name not in switches}
     unsaid = [name for name in own if not (given[name] > 0.0 or (given[name] == 0.0 and name.endswith("_mps")))]
     filled = given | {name: own[name] for name in unsaid}
     filled["others_smallest_m"] = min(filled["others_smallest_m"], body.radius_m)
     filled["others_largest_m"] = max(filled["others_largest_m"], filled["others_smallest_m"])
-    return Guarding(**filled, others_yield=bool(guarding.others_yield))
+    return Guarding(**filled, others_yield=bool(guarding.others_yield), enabled=bool(guarding.enabled))
 
 
 def keeps_beside(body: Body, sensor: Sensor) -> float:

@@ -11,6 +11,7 @@ from swarmscope.errors import ConfigError, InputFileError, UnknownNameError, nea
 from swarmscope.onboard.planners import load_planner, planner_names
 from swarmscope.scenarios.costs import check_costs
 from swarmscope.scenarios.places import is_packaged
+from swarmscope.scenarios.presets import with_preset
 from swarmscope.scenarios.scenario import Scenario
 from swarmscope.tasks import task_names
 from swarmscope.texts import read_yaml
@@ -32,6 +33,7 @@ def parse_scenario(values: Any, where: str) -> Scenario:
     """Return the scenario in ``values``; a ConfigError names place, problem and the nearest valid key."""
     if not isinstance(values, dict):
         raise ConfigError(where, "a scenario is a mapping of keys to values")
+    values = with_preset(values, where)
     try:
         scenario = Scenario.model_validate(values)
     except ValidationError as error:

@@ -201,8 +201,11 @@ class RadioModel(_Strict):
 
 
 class GuardModel(_Strict):
-    """Distances kept free around the body."""
+    """Distances kept free around the body; ``guard: false`` is ``guard: {enabled: false}``."""
 
+    enabled: bool = GUARDING.enabled
+    """Whether there is a guard. Without one, for studies only, what a planner decides is driven as it is, and a contact
+    ends a robot; a robot on wheels always has one."""
     clearance_m: Reach = GUARDING.clearance_m
     """Kept free around the body by the guard, which slows down or stops [m]."""
     footprint_clearance_m: Reach = GUARDING.footprint_clearance_m
@@ -230,6 +233,11 @@ class GuardModel(_Strict):
     as fast as the fastest disc that moves in this world, 0: there are none [m/s]."""
     strangers_m: Annotated[float, Field(ge=-1.0, le=1000.0), NUMBER] = GUARDING.strangers_m
     """Radius of the smallest of them; 0 and below: of the smallest disc that moves here, 0.2 m without one [m]."""
+
+
+def _switched(value: Any) -> Any:
+    """Read true and false as a guard that is enabled or not."""
+    return {"enabled": value} if isinstance(value, bool) else value
 
 
 class SafetyModel(_Strict):
@@ -315,6 +323,9 @@ class PlannerModel(_Strict):
     """Name of the planner (``swarmscope planners``)."""
     model: str | None = None
     """Folder of the network that it runs instead of its own; only for planners with a network."""
+    preset: str | None = None
+    """Keys of all groups that hold where nothing else is said: ``printed``, the planner as its document prints it
+    (``swarmscope planners NAME`` lists them)."""
     params: dict[str, Annotated[float, Field(allow_inf_nan=False), NUMBER]] = {}
     """Parameters of the planner by name; those not given have their defaults."""
 
@@ -344,8 +355,8 @@ class Scenario(_Strict):
     """The link between robots."""
     faults: FaultsModel = FaultsModel()
     """What fails in the middle of a run, at random times; a rate is for each robot, 0 is never."""
-    guard: GuardModel = GuardModel()
-    """Distances kept free around the body."""
+    guard: Annotated[GuardModel, BeforeValidator(_switched)] = GuardModel()
+    """Distances kept free around the body; ``false``, for studies only: no guard."""
     safety: SafetyModel = SafetyModel()
     """Which directions are safe."""
     features: FeaturesModel = FeaturesModel()

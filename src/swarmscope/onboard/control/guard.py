@@ -68,6 +68,9 @@ def guard(see: View) -> bool:
         return True
     w = min(rig.body.w_max_radps, max(-rig.body.w_max_radps, w))
     asked = min(rig.body.v_max_mps, max(0.0, asked))
+    if not rig.guarding.enabled:
+        out["v"], out["w"] = asked, w
+        return False
     v, w, why = _allowed(see, asked, w)
     if why == R_HELD_HOLE and max(v, percept["speed"]) <= HARDLY * asked:
         v, w = 0.0, w if percept["speed"] <= STANDS_MPS else 0.0

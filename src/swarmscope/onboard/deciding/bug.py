@@ -58,6 +58,9 @@ class Driving(NamedTuple):
     still_s: float
     wait_m: float
     wait_s: float
+    in_place: bool
+    nearer: bool
+    loops: bool
 
 
 @jit_inline
@@ -66,6 +69,7 @@ def driving_of(params: Any) -> Driving:
     return Driving(
         params.seed, params.key_deg, params.face_deg, params.turn_back_deg,
         params.arrive_m, params.creep, params.still_s, params.wait_m, params.wait_s,
+        params.in_place != 0, params.nearer != 0, params.loops != 0,
     )  # fmt: skip
 
 
@@ -125,11 +129,11 @@ def advance(see: View, memory: Row, driving: Driving) -> bool:
     free = goal_is_free(see, final)
     reason = R_FINAL if final and free else R_FREE
     if memory["side"] != 0:
-        if loops(percept, see.shared, memory):
+        if driving.loops and loops(percept, see.shared, memory):
             memory["looped"] = memory["toss"] = 1
             memory["edge"] = 0
             reason = R_LOOP
-        elif (final and free) or _may_leave(percept, memory):
+        elif (final and free) or _may_leave(percept, memory, driving.nearer):
             memory["looped"] = 0
             memory["edge"] = memory["side"]
         else:
@@ -146,7 +150,7 @@ def advance(see: View, memory: Row, driving: Driving) -> bool:
         reason = R_FOLLOW
     memory["mode"] = MODE_A if abs(heading) > math.radians(driving.face_deg) else MODE_B
     memory["heading"] = percept["compass"] + heading
-    _drive(see, heading, driving)
+    _drive(see, memory, heading, driving)
     _say(see, memory, reason)
     return True
 
@@ -166,10 +170,10 @@ def _edge(see: View, memory: Row, driving: Driving) -> float:
 
 
 @jit_inner
-def _may_leave(percept: Row, memory: Row) -> bool:
-    """Tell whether a following may end: nearer to the goal than its key point, the goal on the free side."""
+def _may_leave(percept: Row, memory: Row, nearer: bool) -> bool:
+    """Tell whether a following may end: the goal on the free side and, if asked, ``nearer`` than at its key point."""
     off = memory["side"] * wrap_angle(percept["compass"] + percept["goal_bearing"] - memory["heading"])
-    return bool(percept["goal_distance"] < memory["closest"] and FREE_FROM < off < FREE_TO)
+    return bool((not nearer or percept["goal_distance"] < memory["closest"]) and FREE_FROM < off < FREE_TO)
 
 
 @jit
@@ -215,7 +219,7 @@ def follow(see: View, memory: Row, driving: Driving) -> None:
         memory["mode"] = MODE_E if in_front else MODE_C
     else:
         memory["mode"] = MODE_F if in_front else MODE_D
-    _drive(see, heading, driving)
+    _drive(see, memory, heading, driving)
     _say(see, memory, reason)
     if see.out["fused"]:
         see.out["state"] = DECIDE
@@ -224,11 +228,14 @@ def follow(see: View, memory: Row, driving: Driving) -> None:
 
 
 @jit_inner
-def _drive(see: View, heading: float, driving: Driving) -> None:
+def _drive(see: View, memory: Row, heading: float, driving: Driving) -> None:
     """Ask for driving towards ``heading`` (body frame) as fast as (2) and the way left allow."""
     view = 0.5 * see.rig.protection.alpha
     allowed = safe_speed(see.scan, see.rig, heading, see.percept["dt_s"], view)
-    head_for(see, heading, min(last_speed(see, driving.arrive_m), max(allowed, driving.creep)))
+    speed = min(last_speed(see, driving.arrive_m), max(allowed, driving.creep))
+    if driving.in_place and memory["mode"] in (MODE_A, MODE_C, MODE_D):
+        speed = 0.0
+    head_for(see, heading, speed)
 
 
 @jit_inner

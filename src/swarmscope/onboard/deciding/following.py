@@ -6,7 +6,7 @@ What Nav-SCOPE (state iii) and SFM-MAS (IV-C) share. ``memory`` is a row of ``de
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,9 +24,10 @@ from swarmscope.onboard.rig import NARROW
 from swarmscope.onboard.sensor import Sensor
 from swarmscope.onboard.view import View
 
+QUARTER = 0.5 * math.pi
 REOPEN_WITHIN = 1.0
 """A following changes sides only for a direction this near to the target [rad]."""
-REOPEN_AHEAD = 0.5 * math.pi
+REOPEN_AHEAD = QUARTER
 """And only for one this near to where it looks: who turns back along the same border finds nothing new [rad]."""
 
 
@@ -83,6 +84,21 @@ def advance(see: View, memory: Row, speed: float, reason: int) -> None:
     say(see, memory, ADVANCE, reason)
 
 
+class Bordering(NamedTuple):
+    """How a border is followed: the numbers that planners bring (their ``Params`` explain each)."""
+
+    wide_turn: float
+    turn_back: float
+    escape: bool
+    finish_turns: bool
+
+
+@jit_inline
+def bordering_of(params: Any) -> Bordering:
+    """Return how a planner's ``Params`` have a border followed."""
+    return Bordering(params.wide_turn, params.turn_back, params.escape != 0, params.finish_turns != 0)
+
+
 class Way(NamedTuple):
     """A direction that is open (body frame, rad), its turn from where the search began, and whether there is one."""
 
@@ -92,8 +108,11 @@ class Way(NamedTuple):
 
 
 @jit_inline
-def follow(see: View, memory: Row, wide_turn: float, turn_back: float, speed: float) -> None:
-    """State iii: the first safe direction on the chosen side, counted from the target (16), or from the border."""
+def follow(see: View, memory: Row, manner: Bordering, speed: float) -> None:
+    """State iii: the first safe direction on the chosen side, counted from the target (16), or from the border.
+
+    At a dead end narrower gaps are looked for, or as printed the robot turns on the spot towards the side.
+    """
     side = int(memory["side"])
     reason, state = R_FOLLOW, FOLLOW
     if see.out["fused"]:
@@ -102,19 +121,22 @@ def follow(see: View, memory: Row, wide_turn: float, turn_back: float, speed: fl
         reason = R_LOOP
     target = see.percept["compass"] + see.percept["goal_bearing"]
     wind = memory["wind"] - side * wrap_angle(target - memory["target"])
-    back = max(0.0, wind - turn_back)
+    back = max(0.0, wind - manner.turn_back)
     start = see.percept["goal_bearing"] + side * back
     safe = first_way(see.safe, start, side, see.rig.sensor)
-    way = _narrower(see, safe, start, side, wide_turn)
+    way = _narrower(see, safe, start, side, manner.wide_turn) if manner.escape else safe
     heading = way.heading
-    if not way.found:
+    if not way.found and not manner.escape:
+        heading, speed = side * QUARTER, 0.0
+        reason, state = R_DEAD_END, ESCAPE
+    elif not way.found:
         heading = away_from_nearest(see)
         reason = R_LOST
     else:
         if not safe.found:
             reason, state = R_DEAD_END, ESCAPE
         memory["wind"], memory["target"] = back + way.turn, target
-    head_for(see, _keep_turning(see, memory, heading), speed)
+    head_for(see, _keep_turning(see, memory, heading) if manner.finish_turns else heading, speed)
     see.out["state"], see.out["reason"], see.out["side"] = state, reason, side
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.onboard.deciding.fields import P_FREE, interaction_force, yields_to
@@ -39,6 +39,29 @@ def wait(see: View, memory: Row, must: bool, longest_s: float) -> None:
     see.out["state"], see.out["reason"] = YIELD, R_YIELD
 
 
+NOBODY, AT_LEAST_1, AS_PRINTED = range(3)
+"""Weights of neighbours in (17) and (27): 0, so that nobody is repelled; w_i, but at least 1; w_i."""
+
+
+class Repulsion(NamedTuple):
+    """How (17) and (27) are taken: the numbers that planners bring (their ``Params`` explain each)."""
+
+    still_s: float
+    weight: float
+    priority: bool
+
+
+@jit_inline
+def repulsion_of(params: Any) -> Repulsion:
+    """Return how a planner's ``Params`` take (17) and (27)."""
+    weight = 0.0
+    if params.repulsion == AS_PRINTED:
+        weight = params.w_i
+    elif params.repulsion == AT_LEAST_1:
+        weight = max(params.w_i, 1.0)
+    return Repulsion(params.still_s, weight, params.priority != 0)
+
+
 class Meeting(NamedTuple):
     """A neighbour within sigma_a that moves: where it is (compass frame, rad), and its force (12) on us, negative."""
 
@@ -48,8 +71,8 @@ class Meeting(NamedTuple):
 
 
 @jit_inner
-def _meeting(see: View, t: int, still_s: float, w_i: float) -> Meeting:
-    """Return how track ``t`` meets us; a weight below 1 would let robots drive into one another."""
+def _meeting(see: View, t: int, still_s: float, weight: float) -> Meeting:
+    """Return how track ``t`` meets us."""
     shared, sigma_a = see.shared, see.rig.protection.sigma_a
     if not moves(see.percept, shared, t, still_s):
         return Meeting(False, 0.0, 0.0)
@@ -57,20 +80,28 @@ def _meeting(see: View, t: int, still_s: float, w_i: float) -> Meeting:
     distance = math.sqrt(x * x + y * y)
     if distance >= sigma_a or distance < 1e-6:
         return Meeting(False, 0.0, 0.0)
-    return Meeting(True, math.atan2(y, x), interaction_force(distance, sigma_a, max(w_i, 1.0)))
+    return Meeting(True, math.atan2(y, x), interaction_force(distance, sigma_a, weight))
 
 
 @jit_inline
 def repelled(see: View, still_s: float, w_i: float) -> bool:
-    """Tell whether (17) holds for a moving neighbour that goes before us.
+    """Tell whether (17) holds for a moving neighbour that goes before us, its weight at least 1.
 
     It does when it drives away from us (we follow it) or, heads-on or crossing, has the smaller radio address.
     """
+    return gives_way(see, Repulsion(still_s, max(w_i, 1.0), True))
+
+
+@jit_inline
+def gives_way(see: View, by: Repulsion) -> bool:
+    """Tell whether (17) holds for a moving neighbour; with ``by.priority`` for one that goes before us."""
     travel = see.percept["compass"] + see.out["heading"]
     for t in range(PEERS):
-        met = _meeting(see, t, still_s, w_i)
+        met = _meeting(see, t, by.still_s, by.weight)
         if not met.near or not yields_to(PROPULSION, met.force, math.cos(met.bearing - travel)):
             continue
+        if not by.priority:
+            return True
         faces_us = math.cos(see.shared["track_yaw"][t] - met.bearing - math.pi) > FACES
         if not faces_us or see.shared["track_id"][t] < see.percept["id"]:
             return True
@@ -78,18 +109,18 @@ def repelled(see: View, still_s: float, w_i: float) -> bool:
 
 
 @jit_inline
-def behind(see: View, still_s: float, w_i: float) -> bool:
-    """Tell whether (27) holds for a moving neighbour that has the higher priority (SFM-MAS IV-D)."""
+def behind(see: View, by: Repulsion) -> bool:
+    """Tell whether (27) holds for a moving neighbour that, with ``by.priority``, goes first (SFM-MAS IV-D)."""
     travel = see.percept["compass"] + see.out["heading"]
     must = False
     for t in range(PEERS):
-        met = _meeting(see, t, still_s, w_i)
+        met = _meeting(see, t, by.still_s, by.weight)
         if not met.near:
             continue
         ours, its = math.cos(met.bearing - travel), -math.cos(met.bearing - see.shared["track_yaw"][t])
         smaller = see.shared["track_id"][t] < see.percept["id"]
-        if yields_to(PROPULSION, met.force, ours) and goes_first(met.force, ours, its, smaller):
-            must = True
+        if yields_to(PROPULSION, met.force, ours):
+            must |= not by.priority or goes_first(met.force, ours, its, smaller)
     return must
 
 

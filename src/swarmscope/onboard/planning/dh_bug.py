@@ -37,17 +37,19 @@ from swarmscope.bounds import Bounds, Degrees, Flag, Metres, Seconds, Seed, Spee
 from swarmscope.onboard.deciding import bug
 from swarmscope.onboard.deciding.bug import KEY_POINT, MEMORY, driving_of, new_memory, toss
 from swarmscope.onboard.deciding.following import turn_to_safe
+from swarmscope.onboard.deciding.printed import printed_bug
 from swarmscope.onboard.percept import Row
 from swarmscope.onboard.perception.safety import safe_directions
 from swarmscope.onboard.rig import FITS, NARROW, PRINTED
 from swarmscope.onboard.view import View
 
-__all__ = ["MEMORY", "NAME", "NEEDS", "SUMMARY", "Params", "decide", "new_memory"]
+__all__ = ["MEMORY", "NAME", "NEEDS", "PRESETS", "SUMMARY", "Params", "decide", "new_memory"]
 
 NAME = "dh-bug"
 SUMMARY = "DH-Bug: straight to the goal or along what is in the way, modes A to F; one side at every key point"
 NEEDS = "own scan, goal bearing and distance, relative poses of visible neighbours"
 TURN_LEFT, TURN_RIGHT, TURN_RANDOM, TURN_NEAREST = range(4)
+PRESETS = {"printed": printed_bug() | {"planner.params.turn": TURN_RANDOM}}
 
 
 class Params(NamedTuple):
@@ -79,6 +81,12 @@ class Params(NamedTuple):
     """Safety distance of 4.2.3; 0 = never waits."""
     wait_s: Seconds = 2.0
     """Longest wait; after it nobody is waited for during the same time."""
+    in_place: Flag = 0
+    """1: in modes A, C and D a robot stands while it turns, as printed; 0: turning and driving overlap."""
+    nearer: Flag = 1
+    """A following ends only nearer to the goal than it began; 0: where the goal is on the free side, as printed."""
+    loops: Flag = 1
+    """Loops are noticed and broken; 0: not, as printed."""
 
 
 @jit_inline

@@ -22,6 +22,7 @@ from swarmscope.onboard.deciding import bug
 from swarmscope.onboard.deciding.asking import obstacle_ahead
 from swarmscope.onboard.deciding.bug import AT_GOAL, KEY_POINT, driving_of, toss
 from swarmscope.onboard.deciding.following import turn_to_safe
+from swarmscope.onboard.deciding.printed import printed_bug
 from swarmscope.onboard.network.answering import draw, empty_graph, gather, look, put_answer
 from swarmscope.onboard.network.asking import ask_round, in_grid, take_latents, usable
 from swarmscope.onboard.network.graph import FEATURES, OWN_CELL
@@ -37,7 +38,7 @@ from swarmscope.onboard.sharing.inbox import waiting_for_answers
 from swarmscope.onboard.sharing.message import direction_of
 from swarmscope.onboard.view import Swarm, View, view_of
 
-__all__ = ["MEMORY", "MODELS", "NAME", "NEEDS", "SUMMARY", "VARIANTS", "Params", "decide_all", "new_memory"]
+__all__ = ["MEMORY", "MODELS", "NAME", "NEEDS", "PRESETS", "SUMMARY", "VARIANTS", "Params", "decide_all", "new_memory"]
 
 NAME = "giwt"
 SUMMARY = "GIWT: DH-Bug, and a graph attention network with information gain chooses the side (extra 'giwt')"
@@ -54,6 +55,7 @@ MODELS = {
     "giwt-gat": shipped("giwt-gat", "gat"),
     "giwt-sage": shipped("giwt-sage", "graphsage"),
 }
+PRESETS = {"printed": printed_bug()}
 DRIVES, WAITS, CHOOSES, FOLLOWS = range(4)
 """What a tick comes to: modes A, B or arrived; stands for answers; a side can be chosen; modes C to F."""
 
@@ -79,6 +81,12 @@ class Params(NamedTuple):
     """Safety distance of 4.2.3; 0 = never waits."""
     wait_s: Seconds = 2.0
     """Longest wait; after it nobody is waited for during the same time."""
+    in_place: Flag = 0
+    """1: in modes A, C and D a robot stands while it turns, as printed; 0: turning and driving overlap."""
+    nearer: Flag = 1
+    """A following ends only nearer to the goal than it began; 0: where the goal is on the free side, as printed."""
+    loops: Flag = 1
+    """Loops are noticed and broken; 0: not, as printed."""
     ask: Flag = 1
     """0: nobody is asked, every side is chosen from the own scan."""
     ask_ahead_s: Seconds = 0.5

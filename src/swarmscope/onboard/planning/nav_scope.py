@@ -6,14 +6,15 @@ an end to every wait, and an end to every loop (docs/safety.md).
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 from swarmscope._jit import jit_inline
-from swarmscope.bounds import Flag, Metres, Radians, Seconds, Weight
+from swarmscope.bounds import Bounds, Flag, Metres, Radians, Seconds, Weight
 from swarmscope.onboard.deciding.asking import request_ahead
 from swarmscope.onboard.deciding.choosing import Manner, decide_side
-from swarmscope.onboard.deciding.following import advance, follow, reconsider
+from swarmscope.onboard.deciding.following import advance, bordering_of, follow, reconsider
 from swarmscope.onboard.deciding.memory import MEMORY, new_memory
+from swarmscope.onboard.deciding.printed import printed_rules
 from swarmscope.onboard.deciding.progress import (
     arrive,
     goal_is_free,
@@ -22,14 +23,14 @@ from swarmscope.onboard.deciding.progress import (
     may_leave,
     watch_progress,
 )
-from swarmscope.onboard.deciding.waiting import repelled, wait
+from swarmscope.onboard.deciding.waiting import gives_way, repulsion_of, wait
 from swarmscope.onboard.percept import Row
 from swarmscope.onboard.planners import Variant
 from swarmscope.onboard.reasons import ARRIVED, FOLLOW, R_FINAL, R_FREE
 from swarmscope.onboard.tick import share
 from swarmscope.onboard.view import View
 
-__all__ = ["MEMORY", "NAME", "NEEDS", "SUMMARY", "VARIANTS", "Params", "decide", "new_memory"]
+__all__ = ["MEMORY", "NAME", "NEEDS", "PRESETS", "SUMMARY", "VARIANTS", "Params", "decide", "new_memory"]
 
 NAME = "nav-scope"
 SUMMARY = "Nav-SCOPE: safe directions, features of neighbours on request, fused choice of side, four states"
@@ -45,6 +46,7 @@ VARIANTS = {
         told=True,
     ),
 }
+PRESETS = {"printed": printed_rules() | {"planner.params.ask_ahead_s": 0.0}}
 
 
 class Params(NamedTuple):
@@ -80,6 +82,14 @@ class Params(NamedTuple):
     """A following changes sides when the way on the other side turns off the target by this much less; 0 as printed."""
     loop_m: Metres = 1.0
     """A second choice of side this close to an earlier one, without progress, is a loop."""
+    repulsion: Annotated[int, Bounds(0, 2)] = 1
+    """Weight of a neighbour in (17): 0 none, nobody is waited for, 1 w_i and at least 1, 2 w_i as printed."""
+    priority: Flag = 1
+    """(17) holds only for who drives ahead of us or has the smaller address; 0: for both of a pair, as printed."""
+    escape: Flag = 1
+    """At a dead end narrower gaps are looked for; 0: the robot turns on the spot, as printed."""
+    finish_turns: Flag = 1
+    """A turn on the spot is finished before another begins; 0: as printed, the present direction counts."""
 
 
 @jit_inline
@@ -101,8 +111,8 @@ def decide(see: View, memory: Row, params: Params) -> None:
             reconsider(see, memory, params.loop_m, params.reopen)
         elif not decide_side(see, memory, count, _manner(params)):
             return
-        follow(see, memory, params.wide_turn, params.turn_back, speed)
-    wait(see, memory, repelled(see, params.still_s, params.w_i), params.wait_s)
+        follow(see, memory, bordering_of(params), speed)
+    wait(see, memory, gives_way(see, repulsion_of(params)), params.wait_s)
     memory["heading"] = see.percept["compass"] + see.out["heading"]
 
 

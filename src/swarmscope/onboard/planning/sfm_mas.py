@@ -7,14 +7,15 @@ obstacle counts, loops, ends of waits) it shares the machinery of Nav-SCOPE (doc
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 from swarmscope._jit import jit_inline
-from swarmscope.bounds import Flag, Metres, Radians, Seconds, Weight
+from swarmscope.bounds import Bounds, Flag, Metres, Radians, Seconds, Weight
 from swarmscope.onboard.deciding.choosing import Manner, decide_side
 from swarmscope.onboard.deciding.fields import P_FREE, obstacle_constant, obstacle_force, propulsion, yields_to
-from swarmscope.onboard.deciding.following import advance, follow, reconsider
+from swarmscope.onboard.deciding.following import advance, bordering_of, follow, reconsider
 from swarmscope.onboard.deciding.memory import MEMORY, new_memory
+from swarmscope.onboard.deciding.printed import printed_rules
 from swarmscope.onboard.deciding.progress import (
     arrive,
     goal_is_free,
@@ -23,7 +24,7 @@ from swarmscope.onboard.deciding.progress import (
     may_leave,
     watch_progress,
 )
-from swarmscope.onboard.deciding.waiting import behind, wait
+from swarmscope.onboard.deciding.waiting import behind, repulsion_of, wait
 from swarmscope.onboard.percept import Row
 from swarmscope.onboard.perception.features import UNMASKED
 from swarmscope.onboard.planners import Variant
@@ -31,7 +32,9 @@ from swarmscope.onboard.reasons import ARRIVED, DECIDE, FOLLOW, R_FINAL, R_FREE
 from swarmscope.onboard.tick import share
 from swarmscope.onboard.view import View
 
-__all__ = ["FEATURE_MASK", "MEMORY", "NAME", "NEEDS", "SUMMARY", "VARIANTS", "Params", "decide", "new_memory"]
+__all__ = [
+    "FEATURE_MASK", "MEMORY", "NAME", "NEEDS", "PRESETS", "SUMMARY", "VARIANTS", "Params", "decide", "new_memory",
+]  # fmt: skip
 
 NAME = "sfm-mas"
 SUMMARY = "SFM-MAS: social forces for stopping, choice of side with the neighbours asked then, and priority"
@@ -45,6 +48,7 @@ VARIANTS = {
         {"w_i": 0.0, "patience_s": 0.0, "answers": 0},
     ),
 }
+PRESETS = {"printed": printed_rules()}
 
 
 class Params(NamedTuple):
@@ -76,6 +80,14 @@ class Params(NamedTuple):
     """A following changes sides when the way on the other side turns off the target by this much less; 0 as printed."""
     loop_m: Metres = 1.0
     """A second choice of side this close to an earlier one, without progress, is a loop."""
+    repulsion: Annotated[int, Bounds(0, 2)] = 1
+    """Weight of a neighbour in (27): 0 none, nobody is waited for, 1 w_i and at least 1, 2 w_i as printed."""
+    priority: Flag = 1
+    """(27) holds only for who is relatively ahead (theory.md, 12); 0: for both of a pair."""
+    escape: Flag = 1
+    """At a dead end narrower gaps are looked for; 0: the robot turns on the spot, as printed."""
+    finish_turns: Flag = 1
+    """A turn on the spot is finished before another begins; 0: as printed, the present direction counts."""
 
 
 @jit_inline
@@ -94,9 +106,9 @@ def decide(see: View, memory: Row, params: Params) -> None:
     elif memory["mode"] == FOLLOW or decide_side(see, memory, count, _manner(params)):
         if not see.out["fused"]:
             reconsider(see, memory, params.loop_m, params.reopen)
-        follow(see, memory, params.wide_turn, params.turn_back, speed)
+        follow(see, memory, bordering_of(params), speed)
     if memory["mode"] != DECIDE:
-        wait(see, memory, behind(see, params.still_s, params.w_i), params.wait_s)
+        wait(see, memory, behind(see, repulsion_of(params)), params.wait_s)
         memory["heading"] = see.percept["compass"] + see.out["heading"]
 
 
