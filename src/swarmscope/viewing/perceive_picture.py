@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from swarmscope.errors import InputFileError
+from swarmscope.lettering import drawing
 from swarmscope.viewing.colours import FAINT, GROUND, INK
 
 if TYPE_CHECKING:
@@ -27,12 +28,10 @@ BARS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0)
 
 def write_perceive_picture(path: Path, seen: Perception, title: str) -> Path:
     """Draw ``PANELS`` scans, the richest of each part of the log; return the picture's path."""
-    import matplotlib as mpl
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    with mpl.rc_context():
-        mpl.rcdefaults()
+    with drawing():
         chosen = _choose(seen)
         rows, columns = SHAPES[len(chosen)]
         left, right, bottom, top = extent = _extent(seen, chosen)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from swarmscope.lettering import drawing
 from swarmscope.sim.world import Circle, Door, Grid, Obstacle, Polygon, Wall
 from swarmscope.viewing.colours import (
     CRASH,
@@ -62,12 +63,10 @@ def write_picture(run_dir: Path, close: bool = False) -> Path:
 
 
 def _render(run: RunData, close: bool) -> bytes:
-    import matplotlib as mpl
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    with mpl.rc_context():
-        mpl.rcdefaults()
+    with drawing():
         extent = extent_of(run, close)
         width, height = extent[2] - extent[0], extent[3] - extent[1]
         inch = LONG_SIDE_IN / max(width, height)

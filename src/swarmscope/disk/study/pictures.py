@@ -21,6 +21,7 @@ from swarmscope.disk.stalls import (
     paths,
     potential_on_grid,
 )
+from swarmscope.lettering import drawing
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,8 +35,6 @@ MANY = 20
 """More robots than that are drawn thinner and without their shortest ways."""
 TRACE_STEP = 0.004
 LEVELS, POTENTIAL_POINTS = 22, 121
-PLAIN: dict[str, Any] = {"parse_math": False}
-"""For texts with names of users, in which a dollar sign is a dollar sign."""
 STUCK, ROUND_AND_ROUND, TOUCHING = "#d55e00", "#cc79a7", "#7a3ea8"
 
 
@@ -63,10 +62,10 @@ def paths_side_by_side_png(of: Problem, b: int, runs: Sequence[tuple[str, Outcom
             axes = figure.add_axes(((k + 0.02) / len(runs), 0.02, 0.96 / len(runs), 0.84))
             _draw_paths(axes, of, b, outcome, film)
             words = STATUS_WORDS[outcome.status[b]]
-            axes.set_title(f"{label}: {words}, {outcome.steps[b]} steps", fontsize=11, color=INK, loc="left", **PLAIN)
+            axes.set_title(f"{label}: {words}, {outcome.steps[b]} steps", fontsize=11, color=INK, loc="left")
         name, permutation = of.maps[of.map_of[b]].name, _permutation_words(of, b)
         title = f"{name}, {permutation}; bound {bound} steps"
-        figure.text(0.012, 0.95, title, fontsize=12, color=INK, weight="bold", **PLAIN)
+        figure.text(0.012, 0.95, title, fontsize=12, color=INK, weight="bold")
 
     return _png(draw, (5.2 * len(runs), 6.0))
 
@@ -283,18 +282,16 @@ def _plain_axes(axes: Axes) -> None:
 
 def _title(figure: Any, title: str, words: str) -> None:
     height = figure.get_size_inches()[1]
-    figure.text(0.03, 1.0 - 0.36 / height, title, fontsize=13, color=INK, weight="bold", **PLAIN)
-    figure.text(0.03, 1.0 - 0.62 / height, words, fontsize=9.5, color=FAINT, **PLAIN)
+    figure.text(0.03, 1.0 - 0.36 / height, title, fontsize=13, color=INK, weight="bold")
+    figure.text(0.03, 1.0 - 0.62 / height, words, fontsize=9.5, color=FAINT)
 
 
 def _png(draw: Callable[[Any], None], size: tuple[float, float]) -> bytes:
     """Return what ``draw`` puts on a figure; the same drawing gives the same bytes."""
-    import matplotlib as mpl
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    with mpl.rc_context():
-        mpl.rcdefaults()
+    with drawing():
         figure = Figure(figsize=size, dpi=130, facecolor="white")
         FigureCanvasAgg(figure)
         draw(figure)

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from swarmscope.lettering import drawing
 from swarmscope.sim.world import Obstacle
 from swarmscope.viewing.colours import CRASH, FAINT, GROUND, INK, SOLID, SOLID_EDGE
 from swarmscope.viewing.pictures import draw_obstacles
@@ -51,8 +52,7 @@ def style() -> Iterator[None]:
     """Draw with matplotlib's defaults, whatever the user's settings, in the report's type and colours."""
     import matplotlib as mpl
 
-    with mpl.rc_context():
-        mpl.rcdefaults()
+    with drawing():
         mpl.rcParams.update(
             {
                 "font.size": 9.0,

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from swarmscope.lettering import drawing
 from swarmscope.viewing.colours import CRASH, GROUND, INK, MOVER, SAFE, WALL, robot_colours
 from swarmscope.viewing.pictures import MOST_NUMBERS, draw_frame, draw_obstacles, extent_of
 from swarmscope.viewing.run_data import RunData, discs_of, doors_of, headline
@@ -28,12 +29,9 @@ class Scene:
     """The world of a run on ``size`` pixels, its longer side; ``close``: where the robots have been."""
 
     def __init__(self, run: RunData, size: int, scans: bool, speed: float, close: bool = False) -> None:
-        import matplotlib as mpl
-
         self._run, self._scans, self._speed = run, scans, speed
         self.moments = Moments(run)
-        with mpl.rc_context():
-            mpl.rcdefaults()
+        with drawing():
             self._build(size, close)
 
     def frame(self, t_s: float) -> Frame:
