@@ -97,7 +97,7 @@ def test_gap_and_flow_time_name_planners():
 def test_table_two_of_giwt_is_complete():
     giwt = load_experiment(shipped_experiment("giwt"))
     found = units(giwt)
-    assert len({u.seed for u in found}) == 500 and len(found) == 3 * 11 * 500
+    assert len({u.seed for u in found}) == 500 and len(found) == 3 * 13 * 500
     assert all(u.scenario.judge_sides and u.scenario.limit_s == 300.0 for u in found)
     told = {u.planner for u in found if u.scenario.planner.params.get("told")}
     assert told == {"A* sides"}

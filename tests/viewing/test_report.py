@@ -85,20 +85,33 @@ def test_words_of_a_difference_from_the_published_value(
     assert words.against_published(metric, found, published) == (said, mark)
 
 
-def test_targets_say_by_how_much_they_are_missed():
+def test_targets_are_open_where_the_interval_holds_both():
     rows = tables.target_table(Material(experiment(), RUNS)).rows
     assert texts(rows[0])[3] == "at most 5.0 %"
-    assert texts(rows[0])[5] == "missed by 20.0 points"
-    assert texts(rows[1])[5] == "met, 5.0 points to spare"
+    assert texts(rows[0])[5] == "open: the interval holds the target"
+    assert texts(rows[1])[5] == "open: the interval holds the target"
     said = summary_of(Material(experiment(), RUNS))
-    assert "1 of 2 are met" in said
-    assert "path redundancy γ of Ours in P is 25.0 % instead of at most 5.0 % (missed by 20.0 points" in said
+    assert "0 of 2 are met. Of 2 the interval holds both: they are neither met nor missed." in said
 
 
-def test_a_target_missed_by_less_than_the_digits_shown_is_missed():
-    assert words.against_bound("arrival_rate", 0.9999, None, 1.0) == ("missed by less than 0.1 points", "bad")
-    assert words.against_bound("duration_s", 66.2, 66.2, None).words == "met exactly"
-    assert words.against_bound("duration_s", math.nan, 66.2, None) == ("not measured", "bad")
+@pytest.mark.parametrize(
+    ("metric", "found", "at_most", "at_least", "said"),
+    [
+        ("arrival_rate", (0.9998, 0.9997, 0.9999), None, 1.0, ("missed by less than 0.1 points", "bad")),
+        ("arrival_rate", (0.9, 0.85, 0.94), None, 1.0, ("missed by 10.0 points", "bad")),
+        ("arrival_rate", (1.0, 0.99, 1.0), None, 1.0, ("open: the interval holds the target", "")),
+        ("arrival_rate", (1.0, 0.99, 1.0), None, 0.95, ("met, 5.0 points to spare", "good")),
+        ("duration_s", (66.2, 66.2, 66.2), 66.2, None, ("met exactly", "good")),
+        ("duration_s", (60.0, 50.0, 66.0), 66.2, None, ("met, 6.2 s to spare", "good")),
+        ("duration_s", (60.0, 50.0, 67.0), 66.2, None, ("open: the interval holds the target", "")),
+        ("duration_s", (70.0, 60.0, 80.0), 66.2, None, ("open: the interval holds the target", "")),
+        ("duration_s", (70.0, 67.0, 80.0), 66.2, None, ("missed by 3.8 s", "bad")),
+        ("duration_s", (70.0, math.nan, math.nan), 66.2, None, ("open: one map", "")),
+        ("duration_s", (math.nan, math.nan, math.nan), 66.2, None, ("not measured", "bad")),
+    ],
+)
+def test_a_target_is_met_or_missed_only_where_the_whole_interval_is(metric, found, at_most, at_least, said):
+    assert words.against_bound(metric, Interval(*found, 100), at_most, at_least) == said
 
 
 def test_the_order_of_planners_and_the_evidence_against_it():

@@ -9,10 +9,11 @@ from swarmscope.scenarios.scenario import Scenario
 from swarmscope.scenarios.written import written_out
 
 
-def config_command(task: str, planner: str | None, schema: bool) -> None:
+def config_command(task: str, planner: str | None, schema: bool, preset: str | None = None) -> None:
     """Print a complete scenario, or what a scenario may hold."""
     if schema:
         print(json.dumps(Scenario.model_json_schema(), indent=1, ensure_ascii=False))
         return
-    values = {"task": {"name": task}} | ({} if planner is None else {"planner": {"name": planner}})
+    chosen = {key: value for key, value in (("name", planner), ("preset", preset)) if value is not None}
+    values = {"task": {"name": task}, "planner": chosen}
     print(written_out(parse_scenario(values, "command line")), end="")

@@ -41,10 +41,11 @@ def reproduce_command(
     store: Path | None,
     out: Path | None,
     code: bool = True,
+    preset: str | None = None,
 ) -> None:
     """Run a shipped experiment."""
     shipped_experiment(name)  # names the valid ones
-    run_command(name, maps, engine, workers, address, store, out, resume=False, code=code)
+    run_command(name, maps, engine, workers, address, store, out, resume=False, code=code, preset=preset)
 
 
 def run_command(
@@ -57,9 +58,10 @@ def run_command(
     out: Path | None,
     resume: bool,
     code: bool = True,
+    preset: str | None = None,
 ) -> None:
     """Run what is missing and write the report."""
-    experiment = load(file)
+    experiment = load(file, preset)
     files = _code_in(experiment, code)
     machine = make_engine(engine, workers, address)
     place = store_path(experiment, store)
@@ -77,9 +79,9 @@ def run_command(
         raise typer.Exit(FAILED)
 
 
-def status_command(file: str, maps: int | None, store: Path | None) -> None:
+def status_command(file: str, maps: int | None, store: Path | None, preset: str | None = None) -> None:
     """Print what is done, failed and missing."""
-    experiment = load(file)
+    experiment = load(file, preset)
     place = store_path(experiment, store)
     with Store(place, create=False) as results:
         state = state_of(experiment, results, maps)
@@ -98,9 +100,11 @@ def status_command(file: str, maps: int | None, store: Path | None) -> None:
         raise typer.Exit(FAILED)
 
 
-def report_command(file: str, maps: int | None, store: Path | None, out: Path | None, code: bool = True) -> None:
+def report_command(
+    file: str, maps: int | None, store: Path | None, out: Path | None, code: bool = True, preset: str | None = None
+) -> None:
     """Write the report of what is done; users' files are not run for it."""
-    experiment = load(file)
+    experiment = load(file, preset)
     _code_in(experiment, code)
     place = store_path(experiment, store)
     with Store(place, create=False) as results:
@@ -111,9 +115,9 @@ def report_command(file: str, maps: int | None, store: Path | None, out: Path | 
         raise typer.Exit(FAILED)
 
 
-def export_command(file: str, csv: Path, store: Path | None) -> None:
+def export_command(file: str, csv: Path, store: Path | None, preset: str | None = None) -> None:
     """Write the results as CSV."""
-    experiment = load(file)
+    experiment = load(file, preset)
     with Store(store_path(experiment, store), create=False) as results:
         print(f"{csv}: {results.export(experiment.name, csv)} runs")
 
@@ -126,12 +130,12 @@ def _code_in(experiment: Experiment, allowed: bool) -> list[Path]:
     return files
 
 
-def load(file: str) -> Experiment:
-    """Return the experiment in a file, or the shipped one of that name."""
+def load(file: str, preset: str | None = None) -> Experiment:
+    """Return the experiment in a file, or the shipped one of that name, with ``preset`` if one is named."""
     path = Path(file)
     if not path.is_file() and (file in shipped_experiments() or path.suffix not in (".yaml", ".yml")):
         path = shipped_experiment(file)
-    return load_experiment(path)
+    return load_experiment(path, preset)
 
 
 def store_path(experiment: Experiment, store: Path | None) -> Path:

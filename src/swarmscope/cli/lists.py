@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from typing import Any
 
 from rich.markup import escape
 from rich.table import Table
@@ -25,6 +26,9 @@ def list_planners() -> None:
         planner = load_planner(name)
         console.print(f"[bold]{name}[/bold]  {planner.summary.removeprefix(f'{name}: ')}")
         console.print(f"  is given: {planner.needs}", highlight=False)
+        for preset, keys in planner.presets.items():
+            told = " ".join(f"{key}={_plain(value)}" for key, value in keys.items())
+            console.print(f"  planner.preset={preset}: {told}", highlight=False)
         table = Table("planner.params", "default", "takes", "meaning")
         meanings = [escape(key.meaning.replace("``", "")) for key in planner_keys(name)]
         for field, meaning in zip(planner.fields.values(), meanings, strict=True):
@@ -41,6 +45,11 @@ def list_tasks() -> None:
         table.add_row(name, task.SUMMARY, options)
     PlainConsole().print(table)
     print("Example of an option: swarmscope run --task T1 --set task.options.density=0.2")
+
+
+def _plain(value: Any) -> str:
+    """Return a value as --set takes it."""
+    return str(value).lower() if isinstance(value, bool) else _short(value)
 
 
 def _short(value: Value) -> str:

@@ -57,6 +57,9 @@ ReportOut = Annotated[Path | None, typer.Option(help="Folder of the report, else
 
 
 Close = Annotated[bool, typer.Option("--close", help="Draw where robots have been, not the whole world.")]
+PresetName = Annotated[
+    str | None, typer.Option("--preset", help="Planners as their documents print them: printed (docs/theory.md).")
+]
 NoCode = Annotated[bool, typer.Option("--no-code", help="Refuse planners and tasks in FILE.py of somebody's own.")]
 
 
@@ -78,6 +81,7 @@ def common(
 @app.command(
     epilog="Examples:\n\n"
     "[bold]swarmscope run --task T3 --seed 4 --set planner.params.w_i=0[/bold]\n\n"
+    "[bold]swarmscope run --task T3 --planner nav-i --preset printed --set guard=false[/bold]\n\n"
     "[bold]swarmscope run examples/noisy_radio.yaml[/bold]\n\n"
     "[bold]swarmscope run --map willow_garage_office --robots 5 --seed 23[/bold]\n\n"
     "[bold]swarmscope run --map hall.yaml --start 1,2,90 --goal 8,2 --start 8,3 --goal 1,3[/bold]\n\n"
@@ -113,6 +117,7 @@ def run(
     planner: Annotated[
         str | None, typer.Option(help="Planner (see 'swarmscope planners') or FILE.py, else nav-scope.")
     ] = None,
+    preset: PresetName = None,
     robots: Annotated[
         int | None, typer.Option(help="Number of robots, else as many as have starts or goals on the map, else 15.")
     ] = None,
@@ -143,7 +148,7 @@ def run(
 
     place: dict[str, Any] = {"resolution_m": resolution, "number": number, "trips": trips, "first_trip": first_trip}
     place |= {"starts": start, "goals": goal}
-    options: dict[str, Any] = {"robots": robots, "seed": seed, "limit_s": limit}
+    options: dict[str, Any] = {"robots": robots, "seed": seed, "limit_s": limit, "planner.preset": preset}
     options |= {f"map.{key}": value for key, value in place.items()}
     make = Make(pictures, mcap)
     run_command(scenario, task, map_, planner, options, set_ or [], out, threads, make, not no_code, force)
@@ -158,12 +163,13 @@ def run(
 def config(
     task: Annotated[str, typer.Argument(help="Task (see 'swarmscope tasks').")] = "T1",
     planner: Annotated[str | None, typer.Option(help="Planner (see 'swarmscope planners'), else nav-scope.")] = None,
+    preset: PresetName = None,
     schema: Annotated[bool, typer.Option("--schema", help="Print the JSON schema of scenarios instead.")] = False,
 ) -> None:
     """Print a complete scenario: every key with its default and its meaning."""
     from swarmscope.cli.config import config_command
 
-    config_command(task, planner, schema)
+    config_command(task, planner, schema, preset)
 
 
 @app.command(
@@ -408,12 +414,12 @@ def tasks() -> None:
 @app.command(
     epilog="Examples:\n\n"
     "[bold]swarmscope reproduce nav-scope --maps 20[/bold]\n\n"
-    "[bold]swarmscope reproduce sfm-mas[/bold]\n\n"
+    "[bold]swarmscope reproduce sfm-mas --preset printed[/bold]\n\n"
     "[bold]swarmscope reproduce giwt --maps 20[/bold]\n\n"
     "[bold]swarmscope reproduce nav-scope --engine ray --address auto[/bold]"
 )
 def reproduce(
-    name: Annotated[str, typer.Argument(help="nav-scope, sfm-mas, depository, traps or giwt.")],
+    name: Annotated[str, typer.Argument(help="nav-scope, ablations, sfm-mas, depository, traps or giwt.")],
     maps: Maps = None,
     engine: EngineName = "local",
     workers: Workers = None,
@@ -421,11 +427,12 @@ def reproduce(
     store: StorePath = None,
     out: ReportOut = None,
     no_code: NoCode = False,
+    preset: PresetName = None,
 ) -> None:
     """Run a published experiment, as far as it is not done yet, and write its report."""
     from swarmscope.cli.experiment import reproduce_command
 
-    reproduce_command(name, maps, engine, workers, address, store, out, not no_code)
+    reproduce_command(name, maps, engine, workers, address, store, out, not no_code, preset)
 
 
 @experiments.command(
@@ -443,11 +450,12 @@ def experiment_run(
     store: StorePath = None,
     out: ReportOut = None,
     no_code: NoCode = False,
+    preset: PresetName = None,
 ) -> None:
     """Run what is not in the store yet, then write the report. May be stopped at any moment."""
     from swarmscope.cli.experiment import run_command
 
-    run_command(file, maps, engine, workers, address, store, out, resume=False, code=not no_code)
+    run_command(file, maps, engine, workers, address, store, out, resume=False, code=not no_code, preset=preset)
 
 
 @experiments.command("resume", epilog="Example: [bold]swarmscope experiment resume doors.yaml[/bold]")
@@ -460,29 +468,37 @@ def experiment_resume(
     store: StorePath = None,
     out: ReportOut = None,
     no_code: NoCode = False,
+    preset: PresetName = None,
 ) -> None:
     """Go on with a run that was stopped, and try again what failed."""
     from swarmscope.cli.experiment import run_command
 
-    run_command(file, maps, engine, workers, address, store, out, resume=True, code=not no_code)
+    run_command(file, maps, engine, workers, address, store, out, resume=True, code=not no_code, preset=preset)
 
 
 @experiments.command("status", epilog="Example: [bold]swarmscope experiment status nav-scope[/bold]")
-def experiment_status(file: ExperimentFile, maps: Maps = None, store: StorePath = None) -> None:
+def experiment_status(
+    file: ExperimentFile, maps: Maps = None, store: StorePath = None, preset: PresetName = None
+) -> None:
     """Show how many runs are done, failed and missing."""
     from swarmscope.cli.experiment import status_command
 
-    status_command(file, maps, store)
+    status_command(file, maps, store, preset)
 
 
 @experiments.command("report", epilog="Example: [bold]swarmscope experiment report nav-scope --out report[/bold]")
 def experiment_report(
-    file: ExperimentFile, maps: Maps = None, store: StorePath = None, out: ReportOut = None, no_code: NoCode = False
+    file: ExperimentFile,
+    maps: Maps = None,
+    store: StorePath = None,
+    out: ReportOut = None,
+    no_code: NoCode = False,
+    preset: PresetName = None,
 ) -> None:
     """Write the report of the runs that are done."""
     from swarmscope.cli.experiment import report_command
 
-    report_command(file, maps, store, out, not no_code)
+    report_command(file, maps, store, out, not no_code, preset)
 
 
 @experiments.command("export", epilog="Example: [bold]swarmscope experiment export nav-scope results.csv[/bold]")
@@ -490,11 +506,12 @@ def experiment_export(
     file: ExperimentFile,
     csv: Annotated[Path, typer.Argument(help="CSV file to write.")],
     store: StorePath = None,
+    preset: PresetName = None,
 ) -> None:
     """Write the results as CSV, one row per run, one column per figure."""
     from swarmscope.cli.experiment import export_command
 
-    export_command(file, csv, store)
+    export_command(file, csv, store, preset)
 
 
 @disk.command(

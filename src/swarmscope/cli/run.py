@@ -125,9 +125,9 @@ def _extras(make: Make, exact: Exact | None) -> tuple[Callable[[Path], None], Wa
 
 def _set_option(values: dict[str, Any], key: str, value: Any) -> None:
     """Set an option; starts and goals are text with degrees."""
-    group, dot, name = key.rpartition(".")
+    group, _, name = key.rpartition(".")
     option = f"--{OPTIONS.get(name, name)}"
-    if dot and not isinstance(values.get(group), dict):
+    if group == "map" and not isinstance(values.get(group), dict):
         raise ConfigError(option, "needs --map, or a scenario with a map")
     if name in PLACED:
         value = [_read_place(text, option) for text in value]

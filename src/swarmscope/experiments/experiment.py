@@ -16,6 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from swarmscope.errors import ConfigError, UnknownNameError, nearest_hint
 from swarmscope.experiments.seeds import seed_set
 from swarmscope.judging.metrics import BETWEEN, COUNTED, METRICS
+from swarmscope.onboard.planners import load_planner, planner_names
 from swarmscope.scenarios.read import find_user_files, parse_scenario
 from swarmscope.scenarios.scenario import Scenario
 from swarmscope.texts import read_yaml
@@ -73,6 +74,8 @@ class WeightEstimate(_Strict):
     place: Name
     planner: Name
     seeds: str = "playground"
+    keys: Keys = {}
+    """Keys of a scenario above those of the planner: what belongs to us, not to P_a, is taken out by them."""
 
 
 class Gap(_Strict):
@@ -96,6 +99,8 @@ class Experiment(_Strict):
     about: str = ""
     seeds: str = "evaluation"
     """A set of seeds.yaml, 'first-last', or a list of these."""
+    preset: str | None = None
+    """For every planner that has a preset of this name (``planner.preset``) and names none itself."""
     scenario: Keys = {}
     places: Annotated[dict[Name, Keys], Field(min_length=1)]
     planners: Annotated[dict[Name, Keys], Field(min_length=1)]
@@ -172,10 +177,16 @@ def shipped_experiment(name: str) -> Path:
     return Path(str(files("swarmscope") / "data" / "experiments" / f"{name}.yaml"))
 
 
-def load_experiment(path: Path) -> Experiment:
-    """Return the experiment in YAML file ``path``, every scenario of it checked."""
+def load_experiment(path: Path, preset: str | None = None) -> Experiment:
+    """Return the experiment in YAML file ``path``, every scenario of it checked.
+
+    With a ``preset`` it is an experiment of its own: name and title say so, figures published are the same.
+    """
     values = read_yaml(path)
     if isinstance(values, dict):
+        if preset is not None:
+            values |= {"preset": preset, "name": f"{values.get('name')}-{preset}"}
+            values["title"] = f"{values.get('title')} (preset {preset})"
         for keys in _scenarios_in(values):
             find_user_files(keys, path.parent)
     return parse_experiment(values, str(path))
@@ -205,6 +216,7 @@ def parse_experiment(values: Any, where: str) -> Experiment:
         raise ConfigError(f"{where}: {error.where}", error.why) from None
     except UnknownNameError as error:
         raise UnknownNameError(error.kind, error.name, error.valid, f"{where}: seeds") from None
+    _check_preset(experiment, where)
     for place, planner, keys in _variants(experiment):
         parse_scenario(keys | {"seed": seeds[0]}, f"{where}: {place}, {planner}")
     return experiment
@@ -226,10 +238,10 @@ def units(experiment: Experiment, maps: int | None = None) -> list[Unit]:
 
 def _variants(experiment: Experiment) -> list[tuple[str, str, Keys]]:
     """Return (place, label, scenario keys) of every planner and of every value of every sweep, in every place."""
-    labels: list[tuple[str, Keys]] = list(experiment.planners.items())
+    labels: list[tuple[str, Keys]] = [(label, planner_keys(experiment, label)) for label in experiment.planners]
     for sweep in experiment.sweeps:
         for value in sweep.values:
-            changed = copy.deepcopy(experiment.planners[sweep.planner])
+            changed = copy.deepcopy(planner_keys(experiment, sweep.planner))
             set_path(changed, sweep.key, value)
             labels.append((sweep_label(sweep, value), changed))
     common = {"record_scans": "no"} | experiment.scenario
@@ -238,6 +250,27 @@ def _variants(experiment: Experiment) -> list[tuple[str, str, Keys]]:
         for label, keys in labels
         for place, place_keys in experiment.places.items()
     ]
+
+
+def planner_keys(experiment: Experiment, label: str) -> Keys:
+    """Return the keys of a planner of the experiment, with the experiment's preset if the planner has it."""
+    keys = experiment.planners[label]
+    if experiment.preset is None or experiment.preset not in _presets_of(keys):
+        return keys
+    return merged({"planner": {"preset": experiment.preset}}, keys)
+
+
+def _presets_of(keys: Keys) -> list[str]:
+    """Return the presets of the planner that the keys name, none where they name none that is known."""
+    group = keys.get("planner")
+    name = group.get("name", "nav-scope") if isinstance(group, dict) else ""
+    return list(load_planner(name).presets) if name in planner_names() else []
+
+
+def _check_preset(experiment: Experiment, where: str) -> None:
+    known = sorted({preset for keys in experiment.planners.values() for preset in _presets_of(keys)})
+    if experiment.preset is not None and experiment.preset not in known:
+        raise UnknownNameError("preset", experiment.preset, known, f"{where}: preset")
 
 
 def sweep_label(sweep: Sweep, value: float) -> str:

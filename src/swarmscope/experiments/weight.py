@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarmscope.errors import ConfigError
-from swarmscope.experiments.experiment import Experiment, merged
+from swarmscope.experiments.experiment import Experiment, merged, planner_keys
 from swarmscope.experiments.seeds import seed_set
 from swarmscope.judging.run import play
 from swarmscope.judging.statistics import RESAMPLES, Interval, wilson
-from swarmscope.onboard.deciding.fields import interaction_force
+from swarmscope.onboard.deciding.fields import interaction_force, neighbour_weight
 from swarmscope.scenarios.read import parse_scenario
 
 SELF_PRINTED, NEIGHBOUR_PRINTED, WEIGHT_PRINTED = 0.245, 0.446, 0.195
@@ -42,11 +42,11 @@ class WeightResult(NamedTuple):
 def adaboost_weight(own_error: float, neighbour_error: float) -> float:
     """Return the optimal |f_ai| (Nav-SCOPE 21), natural logarithms; NaN where it does not exist.
 
-    ln((1 - e_n) / e_n) / ln((1 - e_s) / e_s); 0.245 and 0.446 give 0.193 (printed 0.195, readings 11).
+    0.245 and 0.446 give 0.193 (printed 0.195, readings 11).
     """
     if not (0.0 < own_error < 1.0 and 0.0 < neighbour_error < 1.0) or own_error == 0.5:
         return math.nan
-    return math.log((1.0 - neighbour_error) / neighbour_error) / math.log((1.0 - own_error) / own_error)
+    return float(neighbour_weight(own_error, neighbour_error))
 
 
 def count_errors(choices: np.ndarray) -> tuple[int, int, int, int]:
@@ -64,7 +64,8 @@ def estimate_weight(experiment: Experiment) -> WeightResult:
     asked = experiment.weight
     if asked is None:
         raise ConfigError("weight", "the experiment does not say where to estimate it")
-    keys = merged(merged(experiment.scenario, experiment.places[asked.place]), experiment.planners[asked.planner])
+    keys = merged(merged(experiment.scenario, experiment.places[asked.place]), planner_keys(experiment, asked.planner))
+    keys = merged(keys, asked.keys)
     seeds = seed_set(asked.seeds)
     counts = []
     for seed in seeds:

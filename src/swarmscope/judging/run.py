@@ -185,6 +185,7 @@ def figures(outcome: Outcome) -> dict[str, Any]:
         "run": {
             "task": place_name(scenario),
             "planner": short_name(scenario.planner.name),
+            **scenario.planner.model_dump(include={"preset"}, exclude_none=True),
             "robots": scenario.robots,
             "seed": scenario.seed,
         },

@@ -20,6 +20,8 @@ DIGITS = 6
 def headline(about: Mapping[str, Any], robots: int) -> str:
     """Return what was run in one line, such as ``T1 · nav-scope · 15 robots · seed 0``."""
     parts = [str(about[key]) for key in ("task", "planner") if about.get(key) is not None]
+    if about.get("preset") is not None:
+        parts[-1] += f" ({about['preset']})"
     parts.append(f"{robots} robot{'' if robots == 1 else 's'}")
     if about.get("seed") is not None:
         parts.append(f"seed {about['seed']}")
@@ -28,7 +30,8 @@ def headline(about: Mapping[str, Any], robots: int) -> str:
 
 def usual_folder(scenario: Scenario) -> Path:
     """Return ``runs/<place>-<planner>-<seed>``, with a short hash of all other keys that are not the defaults."""
-    name = f"{place_name(scenario)}-{short_name(scenario.planner.name)}-{scenario.seed}"
+    planner = "-".join(filter(None, (short_name(scenario.planner.name), scenario.planner.preset)))
+    name = f"{place_name(scenario)}-{planner}-{scenario.seed}"
     others = other_than_default(scenario)
     if others:
         text = json.dumps(others, sort_keys=True)
@@ -37,9 +40,10 @@ def usual_folder(scenario: Scenario) -> Path:
 
 
 def other_than_default(scenario: Scenario) -> dict[str, Any]:
-    """Return the keys, dots in between, whose values are not those of a scenario that names place and planner only."""
+    """Return the keys whose values are not those of a scenario that names place, planner and preset only."""
     given = complete(scenario, run_files=False)
-    plain: dict[str, Any] = {"planner": {"name": scenario.planner.name}, "seed": scenario.seed}
+    chosen = scenario.planner.model_dump(include={"name", "preset"}, exclude_none=True)
+    plain: dict[str, Any] = {"planner": chosen, "seed": scenario.seed}
     if scenario.task is not None:
         plain["task"] = {"name": scenario.task.name}
     elif scenario.map is not None:

@@ -102,9 +102,11 @@ def _facts(material: Material) -> Facts:
 
 
 def _again(experiment: Experiment) -> Command:
-    if experiment.name in shipped_experiments():
-        return Command(f"swarmscope reproduce {experiment.name}")
-    return Command("swarmscope experiment run FILE")
+    preset = "" if experiment.preset is None else f" --preset {experiment.preset}"
+    name = experiment.name.removesuffix(f"-{experiment.preset}")
+    if name in shipped_experiments():
+        return Command(f"swarmscope reproduce {name}{preset}")
+    return Command(f"swarmscope experiment run FILE{preset}")
 
 
 def _results(material: Material) -> list[Block]:

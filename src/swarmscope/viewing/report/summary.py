@@ -32,21 +32,21 @@ def _targets(material: Material) -> list[Entry]:
     targets = material.experiment.targets
     if not targets:
         return []
-    missed = []
+    missed, met = [], 0
     for target in targets:
         found = material.figure(target.place, target.planner, target.metric)
-        verdict = words.against_bound(target.metric, found.estimate, target.at_most, target.at_least)
+        verdict = words.against_bound(target.metric, found, target.at_most, target.at_least)
         if verdict.mark == "bad":
             measured = words.value(target.metric, found.estimate)
             wanted = words.bound(target.metric, target.at_most, target.at_least)
-            bound = target.at_most if target.at_most is not None else target.at_least
-            near = "; the interval holds the target" if found.low <= (bound or 0.0) <= found.high else ""
             name = f"{words.in_text(target.metric)} of {target.planner} in {target.place}"
-            missed.append(f"{name} is {measured} instead of {wanted} ({verdict.words}{near})")
-    met = len(targets) - len(missed)
+            missed.append(f"{name} is {measured} instead of {wanted} ({verdict.words})")
+        met += verdict.mark == "good"
+    still = len(targets) - met - len(missed)
     text = f"{met} of {len(targets)} are met."
-    text += f" Not met: {'; '.join(missed)}." if missed else ""
-    return [("bad" if missed else "good", "Targets.", text)]
+    text += f" Of {still} the interval holds both: they are neither met nor missed." if still else ""
+    text += f" Missed: {'; '.join(missed)}." if missed else ""
+    return [("bad" if missed else "good" if not still else "", "Targets.", text)]
 
 
 class Swap(NamedTuple):

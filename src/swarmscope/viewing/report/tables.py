@@ -66,7 +66,7 @@ def target_table(material: Material) -> Table:
     rows = []
     for target in material.experiment.targets:
         found = material.figure(target.place, target.planner, target.metric)
-        verdict = words.against_bound(target.metric, found.estimate, target.at_most, target.at_least)
+        verdict = words.against_bound(target.metric, found, target.at_most, target.at_least)
         bounds = words.interval(target.metric, found)
         rows.append(
             Row(

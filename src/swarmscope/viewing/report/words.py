@@ -139,13 +139,20 @@ def against_published(metric: str, found: Interval, published: float) -> Verdict
     return Verdict(words, _mark(metric, apart))
 
 
-def against_bound(metric: str, measured: float, at_most: float | None, at_least: float | None) -> Verdict:
-    """Say whether a target is met and by how much it is missed."""
+def against_bound(metric: str, found: Interval, at_most: float | None, at_least: float | None) -> Verdict:
+    """Say whether a target is met and by how much it is missed; neither where the interval holds both."""
+    measured = found.estimate
     if not math.isfinite(measured):
         return Verdict("not measured", "bad")
+    if not math.isfinite(found.low):
+        return Verdict("open: one map", "")
     bound = at_most if at_most is not None else at_least
     assert bound is not None  # noqa: S101 (Target has exactly one of them)
     over = measured - bound if at_most is not None else bound - measured
+    worst = found.high if at_most is not None else found.low
+    best = found.low if at_most is not None else found.high
+    if min(best, worst) <= bound <= max(best, worst) and worst != bound:
+        return Verdict("open: the interval holds the target", "")
     size = _size(metric, over)
     if over > 0.0:
         exact = f"less than {_size(metric, 0.0, smallest=True)}" if _nought(size) else size
