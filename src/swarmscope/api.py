@@ -16,7 +16,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from swarmscope.errors import ConfigError, InputFileError, nearest_hint
-from swarmscope.experiments.warm_up import kernels_are_cold
+from swarmscope.experiments.warm_up import COMPILING, kernels_are_cold
 from swarmscope.judging.references import References, reference_ways
 from swarmscope.judging.run import Contents, contents, play
 from swarmscope.judging.run_folder import WORLD, read_config, read_user_files, read_world, write_run
@@ -196,7 +196,7 @@ def _reporting(scenario: Scenario, wanted: bool) -> Iterator[Callable[[float, in
         yield None
         return
     if kernels_are_cold(scenario.planner.name):
-        print("compiling the kernels for the first time (about 40 s, kept on disk) ...", file=sys.stderr)
+        print(COMPILING, file=sys.stderr)
     with progress_bar(scenario, QUIET_S) as report:
         yield report
 

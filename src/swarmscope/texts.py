@@ -14,6 +14,8 @@ from swarmscope.errors import InputFileError
 MOST_BYTES = 64 << 20
 MOST_YAML_BYTES = 4 << 20
 """Of YAML, which takes four seconds a megabyte to read (the faster reader in C crashes on deep nesting)."""
+IN_TEXT = ' in "<unicode string>",'
+"""How the reader of YAML calls what is not a file of its own."""
 MOST_REPEATED, MOST_NODES = 20, 10_000
 """Aliases may make so many times as many values of a text as it has, and so many more."""
 
@@ -56,7 +58,7 @@ def read_yaml(path: Path) -> Any:
     except RecursionError:
         raise InputFileError(path, "is not YAML (brackets in brackets in brackets)") from None
     except (yaml.YAMLError, ValueError, OverflowError) as error:  # a date or a number that there is not
-        raise InputFileError(path, f"is not YAML ({' '.join(str(error).split())})") from None
+        raise InputFileError(path, f"is not YAML ({' '.join(str(error).split()).replace(IN_TEXT, '')})") from None
 
 
 def load_yaml(text: str) -> Any:

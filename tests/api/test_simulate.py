@@ -255,7 +255,7 @@ def test_progress_is_shown_on_a_terminal_only_and_only_if_it_takes_long(monkeypa
     simulate("swap", progress=False, **SHORT)
     assert capsys.readouterr().err == ""
     simulate("swap", **SHORT)
-    assert capsys.readouterr().err == "compiling the kernels for the first time (about 40 s, kept on disk) ...\n"
+    assert capsys.readouterr().err == "compiling the kernels for the first time (a minute or two, kept on disk) ...\n"
     monkeypatch.setattr(api, "kernels_are_cold", lambda planner: False)
     monkeypatch.setattr(api, "QUIET_S", 0.0)
     simulate("swap", robots=3, limit_s=30)

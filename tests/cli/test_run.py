@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ import yaml
 from command_line import SMALL, refused, swarmscope
 
 from swarmscope.cli import run as run_module
+from swarmscope.experiments import warm_up
 from swarmscope.judging.run_folder import RUN_FILES, read_config, read_metrics, read_world
 from swarmscope.judging.run_names import usual_folder
 from swarmscope.scenarios.read import parse_scenario
@@ -340,6 +343,18 @@ def test_first_use_says_that_kernels_are_compiled(tmp_path, monkeypatch):
     assert "compiling the kernels" in swarmscope("run", *SMALL, "--out", tmp_path / "a").stderr
     monkeypatch.undo()
     assert "compiling" not in swarmscope("run", *SMALL, "--out", tmp_path / "b").stderr
+
+
+def test_kernels_are_cold_until_they_are_on_disk_however_old_they_are(tmp_path):
+    def kernel():
+        """Stands for one whose folder is that of its source's state."""
+
+    compiled = SimpleNamespace(_cache=SimpleNamespace(cache_path=str(tmp_path)), py_func=kernel)
+    assert warm_up._is_cold(compiled)
+    index = tmp_path / f"{Path(__file__).stem}.kernel-1.py311.nbi"
+    index.write_bytes(b"")
+    os.utime(index, (1.0, 1.0))  # a checkout makes sources younger than what was compiled of them
+    assert not warm_up._is_cold(compiled)
 
 
 def test_progress_tells_simulated_time_and_robots():

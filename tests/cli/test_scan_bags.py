@@ -106,6 +106,11 @@ def test_the_topic_is_asked_for_when_there_are_several(tmp_path):
         assert (load_scans(bag, Ask(topic=topic)).ranges_m == 2.0).all()
 
 
+def test_a_topic_of_what_is_no_bag_is_refused(tmp_path):
+    (tmp_path / "a.csv").write_text("1,2,3,4,5,6,7,8\n")
+    assert "--topic: " in refused("perceive", tmp_path / "a.csv", "--topic", "/scan")
+
+
 def test_a_bag_without_scans_says_what_it_holds(tmp_path):
     bag = write(tmp_path, lambda types: [("/said", TEXT, types.types[TEXT]("x"), 1.0)])
     assert "holds no LaserScan; its topics are: /said (std_msgs/msg/String)" in refused("perceive", bag)

@@ -133,6 +133,8 @@ def test_trips_of_a_moving_ai_map(tmp_path):
     setup = make_setup(load_scenario(tmp_path / "s.yaml"))
     assert setup.starts[:, :2] == pytest.approx(np.array([[1.25, 2.25], [5.25, 0.75]]))
     assert setup.goals == pytest.approx(np.array([[5.25, 3.25], [0.75, 0.75]]))
+    (tmp_path / "s.yaml").write_text(place.replace("robots: 2", ""))
+    assert load_scenario(tmp_path / "s.yaml").robots == 2  # the file has no more
     for old, new, message in (
         ("robots: 2", "robots: 3", "3 robots take trips 1 to 3, and there are 3: ask for fewer 'robots'"),
         ("resolution_m: 0.5, ", "", r"map\.resolution_m: .*a\.map does not say how large"),
@@ -140,6 +142,22 @@ def test_trips_of_a_moving_ai_map(tmp_path):
         (tmp_path / "s.yaml").write_text(place.replace(old, new))
         with pytest.raises(ConfigError, match=message):
             make_setup(load_scenario(tmp_path / "s.yaml"))
+
+
+def test_a_trip_that_ends_in_a_wall_is_named_as_a_trip(tmp_path):
+    rows = ["@" * 12] + ["@" + "." * 10 + "@"] * 6 + ["@" * 12]
+    (tmp_path / "a.map").write_text("type octile\nheight 8\nwidth 12\nmap\n" + "\n".join(rows) + "\n")
+    trips = [(1, 1, 9, 6), (2, 3, 10, 1), (10, 6, 0, 6)]
+    lines = [f"0\ta.map\t12\t8\t{x}\t{y}\t{p}\t{q}\t9" for x, y, p, q in trips]
+    (tmp_path / "a.scen").write_text("version 1\n" + "\n".join(lines) + "\n")
+    (tmp_path / "s.yaml").write_text("map: {file: a.map, resolution_m: 0.5, trips: a.scen, first_trip: 1}\n")
+    with pytest.raises(ConfigError, match=r"map\.trips: goal of trip 2: "):
+        make_setup(load_scenario(tmp_path / "s.yaml"))
+
+
+def test_a_place_has_as_many_robots_as_starts():
+    place = {"world": {"obstacles": [], "bounds": [-4, -4, 4, 4]}, "starts": [[0, 0, 0]], "goals": [[3, 0]]}
+    assert parse_scenario({"place": place}, "test").robots == 1
 
 
 def test_a_picture_drawn_in_a_paint_program(tmp_path):
@@ -157,6 +175,8 @@ def test_a_maze_of_orion(tmp_path):
     setup = setup_of(tmp_path / "mazes.npz", map=place, robots=2)
     assert setup.starts[:, :2] == pytest.approx(np.array([[1.5, 6.5], [2.5, 4.5]]))
     assert setup.goals == pytest.approx(np.array([[9.5, 1.5], [10.5, 6.5]]))
+    alone = {"map": place | {"file": str(tmp_path / "mazes.npz")}}
+    assert parse_scenario(alone, "test").robots == 2
     assert len(setup_of(tmp_path / "mazes.npz", map=place | {"number": 3}, robots=4).starts) == 4  # none in it: drawn
     for changes, robots, message in (
         ({"number": 4}, 2, r"map\.number: .*mazes\.npz has no maze 4; it has 2: 3, 5"),

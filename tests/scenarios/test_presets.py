@@ -76,7 +76,12 @@ def test_presets_that_there_are_not_are_told(planner, kind, words):
 
 @pytest.mark.parametrize(
     "keys",
-    [{"safety": 3}, {"safety": {"sector": "perhaps"}}, {"planner": {"preset": "printed", "params": 1}}, {"guard": "no"}],
+    [
+        {"safety": 3},
+        {"safety": {"sector": "perhaps"}},
+        {"planner": {"preset": "printed", "params": 1}},
+        {"guard": "no"},
+    ],
 )
 def test_what_is_no_key_is_told_as_without_a_preset(keys):
     with pytest.raises(SwarmscopeError, match="test: "):

@@ -153,10 +153,11 @@ def test_a_map_file_of_a_scenario_is_written_with_its_whole_path(tmp_path, monke
 
 
 def test_numbers_of_robots_starts_and_goals_must_agree():
-    for values in ({"robots": 3}, {"robots": 1}, {}):
+    for values in ({"robots": 3}, {"robots": 1}, {"place": PLACE | {"goals": [*PLACE["goals"], [0, 0]]}}):
         with pytest.raises(ConfigError, match="as many starts and goals as robots"):
-            make_setup(parse_scenario({"place": PLACE, **values}, "test"))
-    assert len(make_setup(parse_scenario({"place": PLACE, "robots": 2}, "test")).starts) == 2
+            make_setup(parse_scenario({"place": PLACE} | values, "test"))
+    for values in ({"robots": 2}, {}):
+        assert len(make_setup(parse_scenario({"place": PLACE} | values, "test")).starts) == 2
 
 
 def test_settings_reach_the_kernels_in_their_units():

@@ -15,7 +15,7 @@ from PIL import Image
 from swarmscope.errors import ConfigError, InputFileError, UnknownNameError
 from swarmscope.sim.contact import static_clearance
 from swarmscope.sim.maps import Trip, closed, load_map, load_movingai, load_trips, packaged_map, save_map
-from swarmscope.sim.maps.movingai import place_of
+from swarmscope.sim.maps.movingai import check_trips, place_of
 from swarmscope.sim.world import Grid, WorldSpec, compile_world, grid_corners, grid_from_solid, solid_from_grid
 
 SETTINGS = {
@@ -237,10 +237,13 @@ def test_trips_of_the_moving_ai_benchmarks(tmp_path):
     file = tmp_path / "a.scen"
     file.write_text("version 1\n0\ta b.map\t8\t4\t1\t0\t6\t3\t7.5\n\n1 a.map 8 4 0 3 7 0 9\n")
     trips = load_trips(file)
-    assert trips == [Trip((1, 0), (6, 3)), Trip((0, 3), (7, 0))]
+    assert trips == [Trip((1, 0), (6, 3), (8, 4)), Trip((0, 3), (7, 0), (8, 4))]
     grid = Grid(resolution=0.5, origin=(0.0, 0.0), width=8, height=4, rows=[])
     assert place_of(trips[0].start, grid) == (0.75, 1.75)
     assert place_of(trips[0].goal, grid) == (3.25, 0.25)
+    check_trips(file, trips, grid)
+    with pytest.raises(ConfigError, match=r"map\.trips: .*a\.scen is for a map of 8 x 4 cells, and this one has 4 x 8"):
+        check_trips(file, trips, Grid(resolution=0.5, origin=(0.0, 0.0), width=4, height=8, rows=[]))
     with pytest.raises(ConfigError, match=r"\(8, 0\) is not on the map of 8 x 4"):
         place_of((8, 0), grid)
     for text in ("", "1 a.map", "version 1\n0 a.map 8 4 1 0 6\n", "version 1\n0 a.map 8 4 -1 0 6 3 7.5\n"):

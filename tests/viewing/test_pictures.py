@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from swarmscope.errors import InputFileError
-from swarmscope.sim.world import grid_from_solid
+from swarmscope.sim.world import Circle, grid_from_solid
 from swarmscope.viewing.pictures import draw_obstacles, extent_of, write_picture
 from swarmscope.viewing.run_data import (
     WorldFile,
@@ -239,3 +239,15 @@ def test_a_wrong_obstacle_is_named(folder: Path) -> None:
     (folder / "world.json").write_text(json.dumps(world))
     with pytest.raises(InputFileError, match=r"world\.json: obstacles\.3"):
         load_run(folder)
+
+
+def test_the_way_of_a_disc_begins_where_it_begins() -> None:
+    axes = Figure().add_subplot()
+    axes.set_xlim(0.0, 10.0)
+    axes.set_ylim(0.0, 10.0)
+    draw_obstacles(axes, [Circle(center=(5.0, 3.0), radius=0.3, velocity=(0.05, 0.0))])
+    (way,) = axes.lines
+    x, y = np.asarray(way.get_data())
+    assert x[0] == 5.0 and x[-1] >= 10.0
+    assert y == pytest.approx([3.0, 3.0])
+    assert axes.get_xlim() == (0.0, 10.0)

@@ -104,7 +104,7 @@ def test_gif_plays_as_long_as_it_should(folder: Path, tmp_path: Path) -> None:
         colours = np.asarray(picture.convert("RGB")).reshape(-1, 3).astype(int)
     assert (np.abs(colours - CRASH).max(axis=1) < 12).sum() > 20
     assert seen[-1] == (55, 55)
-    assert write_video(folder, tmp_path / "b.gif", film).read_bytes() == path.read_bytes()
+    assert write_video(folder, tmp_path / "b.GIF", film).read_bytes() == path.read_bytes()
 
 
 def test_mp4_plays_as_long_as_it_should(folder: Path, tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 from swarmscope.cli._code import announce, files_of, refuse_code
-from swarmscope.experiments.warm_up import kernels_are_cold
+from swarmscope.experiments.warm_up import COMPILING, kernels_are_cold
 from swarmscope.viewing.bag.make import check_packages, make_mcap, scenario_of
 
 
@@ -19,5 +19,5 @@ def mcap_command(run_dir: Path, out: Path | None, threads: int, code: bool) -> N
         refuse_code(files)
     announce(files)
     if kernels_are_cold(scenario.planner.name):
-        print("compiling the kernels for the first time (about 40 s, kept on disk) ...", file=sys.stderr)
+        print(COMPILING, file=sys.stderr)
     print(make_mcap(run_dir, scenario, out, threads))

@@ -17,7 +17,7 @@ from swarmscope.bounds import number_of
 from swarmscope.cli._code import announce, files_of, refuse_code
 from swarmscope.cli._console import PlainConsole
 from swarmscope.errors import ConfigError, UnsolvableWorldError
-from swarmscope.experiments.warm_up import kernels_are_cold
+from swarmscope.experiments.warm_up import COMPILING, kernels_are_cold
 from swarmscope.judging.run import Watch, run_scenario
 from swarmscope.judging.run_folder import check_out, check_same
 from swarmscope.judging.run_names import headline, usual_folder
@@ -88,7 +88,7 @@ def run_command(
         check_same(place, complete(scenario))
     announce(files)
     if kernels_are_cold(scenario.planner.name):
-        print("compiling the kernels for the first time (about 40 s, kept on disk) ...", file=sys.stderr)
+        print(COMPILING, file=sys.stderr)
     exact = Exact() if make.mcap else None
     with progress_bar(scenario) as progress, _named(file):
         metrics = run_scenario(scenario, place, threads, progress, *_extras(make, exact))

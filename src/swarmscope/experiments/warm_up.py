@@ -10,6 +10,9 @@ from swarmscope.experiments.work import make_job
 from swarmscope.onboard.planners import load_planner
 from swarmscope.scenarios.read import parse_scenario
 
+COMPILING = "compiling the kernels for the first time (a minute or two, kept on disk) ..."
+"""What is said meanwhile."""
+
 
 def kernels_are_cold(planner: str) -> bool:
     """Tell whether the compiled kernels of the simulator or of the planner are not on disk yet."""
@@ -33,6 +36,5 @@ def _is_cold(kernel: Any) -> bool:
     folder = getattr(getattr(kernel, "_cache", None), "cache_path", None)
     if folder is None:
         return False  # not a kernel
-    source = Path(kernel.py_func.__code__.co_filename)
-    written = [i.stat().st_mtime for i in Path(folder).glob(f"{source.stem}.{kernel.py_func.__name__}-*.nbi")]
-    return max(written, default=0.0) < source.stat().st_mtime
+    stem = Path(kernel.py_func.__code__.co_filename).stem  # the folder is one for each state of the source
+    return not any(Path(folder).glob(f"{stem}.{kernel.py_func.__name__}-*.nbi"))

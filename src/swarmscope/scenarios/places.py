@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,7 +15,7 @@ from swarmscope.errors import ConfigError
 from swarmscope.sim.maps import Trip, closed, load_map, load_movingai, load_trips, packaged_map
 from swarmscope.sim.maps.gazebo import load_world
 from swarmscope.sim.maps.map_server import YAML
-from swarmscope.sim.maps.movingai import place_of
+from swarmscope.sim.maps.movingai import check_trips, place_of
 from swarmscope.sim.maps.orion import load_maze
 from swarmscope.sim.world import LONGEST_M, Grid, WorldSpec, grid_corners
 from swarmscope.tasks import Setup, Wanted, check_setup, place_wanted, setup_of_task
@@ -87,6 +89,7 @@ def _on_map(scenario: Scenario, place: MapModel) -> Setup:
         trips = _some_trips(trips, place.first_trip, scenario.robots)
         if grid is None:
             raise ConfigError("map.trips", "trips count in cells, and this file holds none")
+        check_trips(Path(place.trips or place.file), trips, grid)
         starts = [place_of(trip.start, grid) for trip in trips]
         goals = [place_of(trip.goal, grid) for trip in trips]
     for key, given in (("starts", starts), ("goals", goals)):
@@ -100,7 +103,32 @@ def _on_map(scenario: Scenario, place: MapModel) -> Setup:
         scenario.seed, scenario.robots, scenario.widest.radius_m, place.min_distance_m, starts, goals, each
     )
     _check_extent(Setup(world, np.zeros((0, 3)), np.zeros((0, 2))), "map")
-    return place_wanted(world, wanted)
+    with _naming_trips(place.first_trip if trips else None):
+        return place_wanted(world, wanted)
+
+
+@contextmanager
+def _naming_trips(first: int | None) -> Iterator[None]:
+    """Name the trip, not a key that nobody gave, in what is wrong with a start or a goal; None: there are no trips."""
+    try:
+        yield
+    except ConfigError as error:
+        found = re.fullmatch(r"map\.(start|goal)s\[(\d+)\]", error.where)
+        if first is None or found is None:
+            raise
+        raise ConfigError(f"map.trips: {found[1]} of trip {first + int(found[2])}", error.why) from None
+
+
+def count_trips(place: MapModel) -> int:
+    """Return how many trips a scenario's map has from the first one on that is asked for; 0 without trips.
+
+    Errors: SwarmscopeError of a file that cannot be read.
+    """
+    if place.trips is not None:
+        return max(0, len(load_trips(Path(place.trips))) - place.first_trip)
+    if place.number is None or place.resolution_m is None:
+        return 0
+    return max(0, len(_read_map(place)[1]) - place.first_trip)
 
 
 def _world_of_map(place: MapModel) -> tuple[WorldSpec, Grid | None, list[Trip]]:

@@ -7,10 +7,10 @@ from typing import Any, get_args
 
 from pydantic import ValidationError
 
-from swarmscope.errors import ConfigError, InputFileError, UnknownNameError, nearest_hint
+from swarmscope.errors import ConfigError, InputFileError, SwarmscopeError, UnknownNameError, nearest_hint
 from swarmscope.onboard.planners import load_planner, planner_names
 from swarmscope.scenarios.costs import check_costs
-from swarmscope.scenarios.places import is_packaged
+from swarmscope.scenarios.places import count_trips, is_packaged
 from swarmscope.scenarios.presets import with_preset
 from swarmscope.scenarios.scenario import Scenario
 from swarmscope.tasks import task_names
@@ -33,9 +33,8 @@ def parse_scenario(values: Any, where: str) -> Scenario:
     """Return the scenario in ``values``; a ConfigError names place, problem and the nearest valid key."""
     if not isinstance(values, dict):
         raise ConfigError(where, "a scenario is a mapping of keys to values")
-    values = with_preset(values, where)
     try:
-        scenario = Scenario.model_validate(values)
+        scenario = _as_many_as_trips(Scenario.model_validate(with_preset(values, where)))
     except ValidationError as error:
         raise _first_problem(error, where) from None
     check_costs(scenario, where)
@@ -46,6 +45,18 @@ def parse_scenario(values: Any, where: str) -> Scenario:
     if chosen.model is not None and not is_file_name(chosen.name) and load_planner(chosen.name).model is None:
         raise ConfigError(f"{where}: planner.model", f"planner '{chosen.name}' runs no network")
     return scenario
+
+
+def _as_many_as_trips(scenario: Scenario) -> Scenario:
+    """Return the scenario with no more robots than its map has trips, if nobody says how many there are."""
+    place, known = scenario.map, scenario.model_fields_set
+    if place is None or place.starts or place.goals or known & {"robots", "robot"}:
+        return scenario
+    try:
+        trips = count_trips(place)
+    except SwarmscopeError:  # which is said where the map is needed
+        return scenario
+    return scenario.model_copy(update={"robots": trips}) if 0 < trips < scenario.robots else scenario
 
 
 def _check_known(kind: str, name: str, names: list[str], where: str) -> None:

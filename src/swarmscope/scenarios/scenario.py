@@ -373,10 +373,10 @@ class Scenario(_Strict):
     @model_validator(mode="before")
     @classmethod
     def _count_robots(cls, values: Any) -> Any:
-        """As many robots as have a start or a goal on the map, or a data sheet, if nobody says how many."""
+        """As many robots as have a start or a goal, or a data sheet, if nobody says how many."""
         if not isinstance(values, dict) or "robots" in values:
             return values
-        chosen = values.get("map")
+        chosen = values.get("map") or values.get("place")
         place: dict[str, Any] = chosen if isinstance(chosen, dict) else {}
         listed = [place[key] for key in ("starts", "goals") if isinstance(place.get(key), list)]
         listed += [values["robot"]] if isinstance(values.get("robot"), list) else []

@@ -107,6 +107,8 @@ def load_scans(path: str | Path, ask: Ask = Ask()) -> ScanLog:  # noqa: B008  a 
         raise ConfigError("--fov", f"must be above 0 and at most 360 degrees, not {ask.fov_deg:g}")
     if ask.first_deg is not None and not math.isfinite(ask.first_deg):
         raise ConfigError("--first", f"must be a finite number of degrees, not {ask.first_deg:g}")
+    if ask.topic is not None and not is_bag(path):
+        raise ConfigError("--topic", f"{path} is no bag: it has no topics")
     try:
         return _checked_log(path.stem, _reader_of(path)(path, ask), ask)
     except BadFile as error:

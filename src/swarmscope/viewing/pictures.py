@@ -137,8 +137,8 @@ def _draw_way(axes: Axes, disc: Circle) -> None:
 
     limits = axes.get_xlim(), axes.get_ylim()
     if disc.velocity is not None:
-        (x, y), (vx, vy) = disc.center, disc.velocity
-        axes.axline(disc.center, (x + vx, y + vy), **WAY)
+        far = math.dist(*np.transpose(limits)) / max(math.hypot(*disc.velocity), 1e-9)
+        axes.plot(*np.transpose([disc.center, np.add(disc.center, np.multiply(far, disc.velocity))]), **WAY)
     else:
         points = [disc.center, *(disc.way or []), *([disc.center] if disc.repeat == "loop" else [])]
         axes.plot(*np.transpose(points), **WAY)

@@ -20,6 +20,8 @@ class Trip(NamedTuple):
 
     start: tuple[int, int]
     goal: tuple[int, int]
+    size: tuple[int, int] | None = None
+    """Columns and rows of the map that it is for, where the file says it."""
 
 
 def load_movingai(path: str | Path, resolution: float = 1.0) -> Grid:
@@ -66,11 +68,11 @@ def load_trips(path: str | Path) -> list[Trip]:
         words = line.split()
         if not words:
             continue
-        cells = words[-5:-1]
+        cells = words[-7:-1]
         if len(words) < 9 or not all(word.isascii() and word.isdecimal() for word in cells):
             raise InputFileError(path, f"line {number}: expected bucket, map, width, height, start, goal, length")
-        x, y, goal_x, goal_y = map(int, cells)
-        trips.append(Trip((x, y), (goal_x, goal_y)))
+        columns, rows, x, y, goal_x, goal_y = map(int, cells)
+        trips.append(Trip((x, y), (goal_x, goal_y), (columns, rows)))
     return trips
 
 
@@ -81,3 +83,13 @@ def place_of(cell: tuple[int, int], grid: Grid) -> tuple[float, float]:
         raise ConfigError("map.trips", f"cell {cell} is not on the map of {grid.width} x {grid.height} cells")
     (x, y), side = grid.origin, grid.resolution
     return x + (column + 0.5) * side, y + (grid.height - row - 0.5) * side
+
+
+def check_trips(path: Path, trips: list[Trip], grid: Grid) -> None:
+    """Raise a ConfigError for trips on a map of another size."""
+    here = (grid.width, grid.height)
+    other = next((trip.size for trip in trips if trip.size not in (None, here)), None)
+    if other is not None:
+        columns, rows = other
+        why = f"{path} is for a map of {columns} x {rows} cells, and this one has {here[0]} x {here[1]}"
+        raise ConfigError("map.trips", why)

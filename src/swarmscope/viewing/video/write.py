@@ -50,13 +50,13 @@ USUAL = Film()
 
 def check_film(path: Path, film: Film) -> None:
     """Raise a ConfigError or a MissingExtraError if there can be no such video."""
-    if path.suffix not in (".gif", ".mp4"):
+    if path.suffix.lower() not in (".gif", ".mp4"):
         raise ConfigError(str(path), "a video's name ends with .gif or .mp4")
     if not path.parent.is_dir():
         raise ConfigError(str(path.parent), "no such folder")
     if film.speed is not None and not SLOWEST <= film.speed <= FASTEST:
         raise ConfigError("--speed", f"must be from {SLOWEST:g} to {FASTEST:g}, not {film.speed!r}")
-    if path.suffix == ".mp4" and find_spec("av") is None:
+    if path.suffix.lower() == ".mp4" and find_spec("av") is None:
         raise MissingExtraError(f"{path}: an .mp4, unlike a .gif,", "video")
 
 
@@ -73,7 +73,7 @@ def write_video(
     _check_size(path, len(times), first)
     frames = _counted((scene.frame(t) for t in times), len(times), progress)
     with replacing(path) as temporary:
-        if path.suffix == ".gif":
+        if path.suffix.lower() == ".gif":
             some = [scene.frame(t) for t in np.linspace(times[0], times[-1], PALETTE_FRAMES)]
             _write_gif(temporary, frames, len(times), film.fps, _palette(some))
         else:
@@ -97,7 +97,7 @@ def _check_size(path: Path, frames: int, first: Frame) -> None:
     if frames > MOST_FRAMES:
         remedy = "give a higher --speed or a lower --fps"
         raise ConfigError(str(path), f"would have more than {MOST_FRAMES} frames: {remedy}")
-    if path.suffix == ".gif" and frames * first.shape[0] * first.shape[1] > MOST_GIF_PIXELS:
+    if path.suffix.lower() == ".gif" and frames * first.shape[0] * first.shape[1] > MOST_GIF_PIXELS:
         raise ConfigError(str(path), "is too much for a .gif: a higher --speed, a lower --fps or --size, or an .mp4")
 
 
