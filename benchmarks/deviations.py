@@ -45,7 +45,7 @@ DEVIATIONS = {
     "every obstacle is a new one": ("planner.params.resume_m",),
     "dead end: turns on the spot": ("planner.params.escape",),
     "turns not finished first": ("planner.params.finish_turns",),
-    "DH-Bug: modes A, C, D stand": ("planner.params.in_place",),
+    "stands while it turns": ("planner.params.in_place",),
     "DH-Bug: random side": ("planner.params.turn",),
     "DH-Bug: leaves without being nearer": ("planner.params.nearer",),
     "DH-Bug: loops not noticed": ("planner.params.loops",),
@@ -67,7 +67,7 @@ def changes_of(planner: str) -> dict[str, tuple[Changes, Changes]]:
     found = {}
     for words, keys in DEVIATIONS.items():
         mine = [key for key in keys if key in preset]
-        if len(mine) == len(keys) and words.startswith("DH-Bug") == ("planner.params.in_place" in preset):
+        if len(mine) == len(keys) and words.startswith("DH-Bug") <= ("planner.params.nearer" in preset):
             printed = tuple(f"{key}={_text(preset[key])}" for key in mine)
             found[words] = (printed, tuple(f"{key}={_text(_at(usual, key))}" for key in mine))
     return found

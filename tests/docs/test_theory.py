@@ -9,7 +9,9 @@ import re
 from pathlib import Path
 
 import pytest
+import yaml
 
+from swarmscope.errors import SwarmscopeError
 from swarmscope.onboard.body import Body, protection_model
 from swarmscope.onboard.deciding.fields import (
     following_probability,
@@ -20,8 +22,9 @@ from swarmscope.onboard.deciding.fields import (
     yields_to,
 )
 from swarmscope.onboard.perception.areas import normalise, passable_distance, quadrant_area
-from swarmscope.onboard.planning import nav_scope
-from swarmscope.scenarios.scenario import SafetyModel
+from swarmscope.onboard.planners import load_planner
+from swarmscope.scenarios.read import parse_scenario
+from swarmscope.scenarios.to_kernels import complete
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
@@ -185,13 +188,33 @@ def test_scan_caption(figures):
     assert not figures.safe_of(rig, ranges)[target]
 
 
-def test_the_keys_that_restore_the_print_exist():
+def _accepted(group, keys, planner):
+    values = {"planner": {"name": planner, "params": keys}} if group == "params" else {group: keys}
+    try:
+        complete(parse_scenario({"task": {"name": "T1"}} | values, "theory.md"))
+    except SwarmscopeError:
+        return False
+    return True
+
+
+def test_the_keys_that_restore_the_print_can_be_set():
     block = TEXT.split("## Where we differ")[1]
-    for group, keys in re.findall(r"`(safety|params): \{([^}]+)\}`", block):
-        names = re.findall(r"(\w+):", keys)
-        known = SafetyModel.model_fields if group == "safety" else nav_scope.Params._fields
-        assert names
-        assert set(names) <= set(known), (group, names)
+    found = re.findall(r"`(safety|features|params): (\{[^}]+\})`", block)
+    assert len(found) > 10
+    for group, text in found:
+        keys = yaml.safe_load(text)
+        assert any(_accepted(group, keys, planner) for planner in ("nav-scope", "dh-bug")), (group, text)
+
+
+def test_what_the_table_restores_is_what_the_presets_set():
+    block = TEXT.split("## Where we differ")[1]
+    told = {}
+    for group, text in re.findall(r"`(safety|features|params): (\{[^}]+\})`", block):
+        place = "planner.params" if group == "params" else group
+        told |= {f"{place}.{key}": value for key, value in yaml.safe_load(text).items()}
+    for planner in ("nav-scope", "sfm-mas", "dh-bug"):
+        for key, value in load_planner(planner).presets["printed"].items():
+            assert told[key] == (pytest.approx(value, abs=1e-3) if isinstance(value, float) else value), key
 
 
 def test_the_place_for_results_is_marked():

@@ -111,3 +111,18 @@ def test_the_printed_bug_notices_no_loops(loops, noticed):
         tick(rows)
         looped.append(bool(rows.memory["looped"]))
     assert any(looped) == noticed
+
+
+@pytest.mark.parametrize("planner", ["nav-scope", "sfm-mas"])
+def test_the_printed_robot_turns_before_it_drives(planner):
+    def command(yaw, **params):
+        rows = one_robot(rig_of(lost_s=0.0), planner=planner, **params)
+        rows.fill(goal_distance=8.0, compass=yaw, goal_bearing=-yaw)
+        rows.scan[:] = scan_at(circles_world([]), rows.rig, yaw=yaw)
+        tick(rows)
+        return float(rows.decision["v"])
+
+    turned = math.radians(25.0)
+    assert command(turned) > 0.0
+    assert command(turned, in_place=1) == 0.0
+    assert command(math.radians(5.0), in_place=1) > 0.0

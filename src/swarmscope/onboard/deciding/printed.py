@@ -29,6 +29,7 @@ def printed_rules() -> dict[str, float | bool | str]:
         "planner.params.priority": 0,
         "planner.params.escape": 0,
         "planner.params.finish_turns": 0,
+        "planner.params.in_place": 1,
     }
 
 

@@ -10,6 +10,7 @@ from typing import Annotated, NamedTuple
 
 from swarmscope._jit import jit_inline
 from swarmscope.bounds import Bounds, Flag, Metres, Radians, Seconds, Weight
+from swarmscope.onboard.control.wanting import turn_first
 from swarmscope.onboard.deciding.asking import request_ahead
 from swarmscope.onboard.deciding.choosing import Manner, decide_side
 from swarmscope.onboard.deciding.following import advance, bordering_of, follow, reconsider
@@ -90,6 +91,8 @@ class Params(NamedTuple):
     """At a dead end narrower gaps are looked for; 0: the robot turns on the spot, as printed."""
     finish_turns: Flag = 1
     """A turn on the spot is finished before another begins; 0: as printed, the present direction counts."""
+    in_place: Flag = 0
+    """1: a robot stands while it turns, as printed; 0: turning and driving overlap."""
 
 
 @jit_inline
@@ -112,6 +115,8 @@ def decide(see: View, memory: Row, params: Params) -> None:
         elif not decide_side(see, memory, count, _manner(params)):
             return
         follow(see, memory, bordering_of(params), speed)
+    if params.in_place:
+        turn_first(see)
     wait(see, memory, gives_way(see, repulsion_of(params)), params.wait_s)
     memory["heading"] = see.percept["compass"] + see.out["heading"]
 

@@ -11,6 +11,7 @@ from typing import Annotated, NamedTuple
 
 from swarmscope._jit import jit_inline
 from swarmscope.bounds import Bounds, Flag, Metres, Radians, Seconds, Weight
+from swarmscope.onboard.control.wanting import turn_first
 from swarmscope.onboard.deciding.choosing import Manner, decide_side
 from swarmscope.onboard.deciding.fields import P_FREE, obstacle_constant, obstacle_force, propulsion, yields_to
 from swarmscope.onboard.deciding.following import advance, bordering_of, follow, reconsider
@@ -88,6 +89,8 @@ class Params(NamedTuple):
     """At a dead end narrower gaps are looked for; 0: the robot turns on the spot, as printed."""
     finish_turns: Flag = 1
     """A turn on the spot is finished before another begins; 0: as printed, the present direction counts."""
+    in_place: Flag = 0
+    """1: a robot stands while it turns, as printed; 0: turning and driving overlap."""
 
 
 @jit_inline
@@ -107,6 +110,8 @@ def decide(see: View, memory: Row, params: Params) -> None:
         if not see.out["fused"]:
             reconsider(see, memory, params.loop_m, params.reopen)
         follow(see, memory, bordering_of(params), speed)
+    if params.in_place:
+        turn_first(see)
     if memory["mode"] != DECIDE:
         wait(see, memory, behind(see, repulsion_of(params)), params.wait_s)
         memory["heading"] = see.percept["compass"] + see.out["heading"]
