@@ -131,7 +131,7 @@ def test_the_mirrored_scene_has_the_opposite_own_probability(pairs, bias):
     assert own_probability(*as_table(pairs, True), HALF_ALPHA, -bias, False) == pytest.approx(1.0 - p, abs=1e-9)
 
 
-def decide(pairs, neighbours, goal_bearing=0.0, compass=0.0, mirror=False, w_i=1.0, bias=0.0, polygon=False):
+def decide(pairs, neighbours, goal_bearing=0.0, compass=0.0, mirror=False, w_i=1.0, bias=0.0, polygon=False, w_n=0.0):
     """Robot 0 with features ``pairs``, neighbours (distance, bearing, features), in the compass frame."""
     rows = one_robot()
     sign = -1.0 if mirror else 1.0
@@ -145,7 +145,7 @@ def decide(pairs, neighbours, goal_bearing=0.0, compass=0.0, mirror=False, w_i=1
         row["heard_angle"][slot], row["heard_distance"][slot], row["heard_n"][slot] = angles, distances, count
     see = rows.view
     see.own.angles[:], see.own.distances[:], count = as_arrays(pairs, mirror)
-    side = choose_side(see, count, w_i, sign * bias, polygon)
+    side = choose_side(see, count, w_i, sign * bias, polygon, w_n)
     return side, rows.said("p_self"), rows.said("p_left"), rows.said("heard")
 
 
@@ -208,6 +208,14 @@ def test_a_neighbour_on_the_left_with_a_free_way_pulls_left():
     assert decide(pairs, [(1.5, 0.5, shut)])[2] < 0.5
     assert decide(pairs, [(1.5, -0.5, free)])[2] < 0.5
     assert decide(pairs, [(1.5, -0.5, shut)])[2] > 0.5
+
+
+def test_the_threshold_can_be_another_than_20():
+    """The neighbour on the left sees 3 m all round: more than 1.95 m, less than 3.8 m."""
+    sees = [(angle, 3.0) for angle in (0.1, 1.6, 3.1, 4.7)]
+    assert decide(sees, [(1.5, 0.5, sees)])[2] > 0.5
+    assert decide(sees, [(1.5, 0.5, sees)], w_n=1.95)[2] == pytest.approx(decide(sees, [(1.5, 0.5, sees)])[2])
+    assert decide(sees, [(1.5, 0.5, sees)], w_n=3.8)[2] < 0.5
 
 
 def test_the_polygon_reading_takes_triangles_and_chords():

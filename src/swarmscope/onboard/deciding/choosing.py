@@ -40,6 +40,7 @@ class Manner(NamedTuple):
     loop_m: float
     polygon: bool
     """Read features as SFM-MAS does: areas (24), passable distances (22) with borders on the chords."""
+    threshold_m: float
 
 
 @jit_inline
@@ -59,7 +60,7 @@ def decide_side(see: View, memory: Row, count: int, manner: Manner) -> bool:
         halt(see)
         say(see, memory, DECIDE, R_ANSWERS)
         return False
-    side = choose_side(see, max(0, count), manner.w_i, side_bias(see, manner.prior), manner.polygon)
+    side = choose_side(see, max(0, count), manner.w_i, side_bias(see, manner.prior), manner.polygon, manner.threshold_m)
     if memory["told"] != 0:
         side = memory["told"]
         see.out["p_left"] = 1.0 if side > 0 else 0.0
@@ -86,23 +87,24 @@ def own_probability(features: Table, count: int, half_alpha: float, bias: float,
 
 
 @jit_inline
-def choose_side(see: View, count: int, w_i: float, bias: float, polygon: bool) -> int:
+def choose_side(see: View, count: int, w_i: float, bias: float, polygon: bool, threshold_m: float = 0.0) -> int:
     """Return the side to pass the obstacle on, +1 left or -1 right, and note the numbers in ``see.out``.
 
     Ours are the ``count`` features in ``see.own``, compass frame, m; ``see.other`` is scratch. Left iff
-    P_dir >= 0.5 (MAP, readings 10).
+    P_dir >= 0.5 (MAP, readings 10). ``threshold_m`` is w_n of (14) where it is not 0.
     """
     percept, rig, features = see.percept, see.rig, see.other
     target = percept["compass"] + percept["goal_bearing"]
     half_alpha = 0.5 * see.rig.protection.alpha
     own = see.own
+    w_n = normalise(threshold_m if threshold_m > 0.0 else rig.protection.w_n, rig.sensor.range_max)
     align_features(own.angles, own.distances, count, -target, features.angles, features.distances)
     _normalise_all(features.distances, count, rig.sensor.range_max)
     p_self = own_probability(features, count, half_alpha, bias, polygon)
     weighted, weights = 0.0, 0.0
     heard = 0
     for t in range(PEERS):
-        opinion = _opinion(see, t, target, w_i, polygon)
+        opinion = _opinion(see, t, target, Reading(w_i, w_n, polygon))
         if not opinion.given:
             continue
         weighted += opinion.force * opinion.left
@@ -127,8 +129,16 @@ class Opinion(NamedTuple):
     """+1 on the left of the target direction, -1 on the right."""
 
 
+class Reading(NamedTuple):
+    """How neighbours' features are read: their weight, the threshold w_n (normalised), and as polygons or not."""
+
+    w_i: float
+    w_n: float
+    polygon: bool
+
+
 @jit_inner
-def _opinion(see: View, t: int, target: float, w_i: float, polygon: bool) -> Opinion:
+def _opinion(see: View, t: int, target: float, by: Reading) -> Opinion:
     """Return the opinion of the neighbour of track ``t``; none outside the pass band, behind us, or unheard."""
     shared, rig, features = see.shared, see.rig, see.other
     nothing = Opinion(False, 0.0, 0.0, 0)
@@ -146,11 +156,11 @@ def _opinion(see: View, t: int, target: float, w_i: float, polygon: bool) -> Opi
     heard = Table(shared["heard_angle"][slot], shared["heard_distance"][slot])
     align_features(heard.angles, heard.distances, n, -target, features.angles, features.distances)
     _normalise_all(features.distances, n, rig.sensor.range_max)
-    half_alpha, threshold = 0.5 * see.rig.protection.alpha, normalise(see.rig.protection.w_n, rig.sensor.range_max)
-    x_1 = passable_distance(features.angles, features.distances, n, 0.0, half_alpha, polygon)
-    x_2 = passable_distance(features.angles, features.distances, n, -half_alpha, 0.0, polygon)
-    left = following_probability(x_1, x_2, threshold, bearing >= 0.0)
-    force = interaction_force(distance, see.rig.protection.sigma_a, w_i)
+    half_alpha = 0.5 * see.rig.protection.alpha
+    x_1 = passable_distance(features.angles, features.distances, n, 0.0, half_alpha, by.polygon)
+    x_2 = passable_distance(features.angles, features.distances, n, -half_alpha, 0.0, by.polygon)
+    left = following_probability(x_1, x_2, by.w_n, bearing >= 0.0)
+    force = interaction_force(distance, see.rig.protection.sigma_a, by.w_i)
     return Opinion(True, left, force, 1 if bearing >= 0.0 else -1)
 
 

@@ -93,6 +93,8 @@ class Params(NamedTuple):
     """A turn on the spot is finished before another begins; 0: as printed, the present direction counts."""
     in_place: Flag = 0
     """1: a robot stands while it turns, as printed; 0: turning and driving overlap."""
+    threshold_m: Metres = 0.0
+    """Threshold w_n of (14); 0: by (20)."""
 
 
 @jit_inline
@@ -125,8 +127,9 @@ def decide(see: View, memory: Row, params: Params) -> None:
 def _manner(params: Params) -> Manner:
     """Return how a side is chosen."""
     return Manner(
-        params.w_i, params.prior, params.ask_every_s, params.patience_s, params.resume_m, params.loop_m, False
-    )
+        params.w_i, params.prior, params.ask_every_s, params.patience_s, params.resume_m, params.loop_m, False,
+        params.threshold_m,
+    )  # fmt: skip
 
 
 @jit_inline

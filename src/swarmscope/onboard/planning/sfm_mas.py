@@ -91,6 +91,8 @@ class Params(NamedTuple):
     """A turn on the spot is finished before another begins; 0: as printed, the present direction counts."""
     in_place: Flag = 0
     """1: a robot stands while it turns, as printed; 0: turning and driving overlap."""
+    threshold_m: Metres = 0.0
+    """Threshold w_n of (15); 0: by (23)."""
 
 
 @jit_inline
@@ -120,7 +122,9 @@ def decide(see: View, memory: Row, params: Params) -> None:
 @jit_inline
 def _manner(params: Params) -> Manner:
     """Return how a side is chosen: neighbours are asked at once."""
-    return Manner(params.w_i, params.prior, 0.0, params.patience_s, params.resume_m, params.loop_m, True)
+    return Manner(
+        params.w_i, params.prior, 0.0, params.patience_s, params.resume_m, params.loop_m, True, params.threshold_m
+    )
 
 
 @jit_inline
