@@ -17,7 +17,7 @@ from swarmscope.experiments.results import (
 
 def run(planner="ours", seed=0, travelled=(10.0, 12.0), shortest=(10.0, 10.0), arrival=(22.0, 30.0), **figures):
     known = {"duration_s": max(arrival), "waiting_s": 1.0, "path_redundancy": 0.1, "collisions": 0.0}
-    arrays = [np.array(values, float) for values in (travelled, shortest, arrival)]
+    arrays = [np.array(values, float) for values in (travelled, shortest, 0.95 * np.array(shortest), arrival)]
     config = {"robot": {"v_max_mps": 0.5}}
     return Run("T1", planner, seed, f"{planner}{seed}", config, known | figures, *arrays, failures=[], cases=[])
 
@@ -29,6 +29,9 @@ def test_sums_go_over_the_robots_of_all_maps():
     assert found["path_stretch"] == pytest.approx(80.0 / 60.0)
     assert found["path_redundancy"] == pytest.approx(1.0 - 0.75 * 60.0 / 80.0)
     assert found["spl"] == pytest.approx((1.0 + 0.5 + 0.8 + 0.0) / 4.0)
+    assert found["path_stretch_any_angle"] == pytest.approx(80.0 / 57.0)  # the true ways are 5 % shorter
+    assert found["path_redundancy_any_angle"] == pytest.approx(1.0 - 0.75 * 57.0 / 80.0)
+    assert found["spl_any_angle"] == pytest.approx(0.95 * found["spl"])
 
 
 def test_groups_and_values():

@@ -35,6 +35,8 @@ class Run:
     """(N,) per robot."""
     shortest_m: Floats
     """(N,) A* reference, NaN without."""
+    any_angle_m: Floats
+    """(N,) the true shortest way, NaN without."""
     arrival_s: Floats
     """(N,) NaN when it did not arrive."""
     failures: list[dict[str, Any]]
@@ -47,13 +49,16 @@ def pooled_figures(runs: Iterable[Run]) -> dict[str, float]:
     """Return path redundancy (24), stretch and SPL with sums over the robots of all runs."""
     every = list(runs)
     travelled = np.concatenate([run.travelled_m for run in every])
-    shortest = np.concatenate([run.shortest_m for run in every])
+    shortest, exact = (np.concatenate([getattr(run, name) for run in every]) for name in ("shortest_m", "any_angle_m"))
     arrival = np.concatenate([run.arrival_s for run in every])
     return {
         "path_redundancy": metrics.path_redundancy(travelled, shortest, arrival),
         "path_redundancy_all": metrics.path_redundancy_all(travelled, shortest, arrival),
         "path_stretch": metrics.path_stretch(travelled, shortest, arrival),
         "spl": metrics.spl(travelled, shortest, arrival),
+        "path_redundancy_any_angle": metrics.path_redundancy(travelled, exact, arrival),
+        "path_stretch_any_angle": metrics.path_stretch(travelled, exact, arrival),
+        "spl_any_angle": metrics.spl(travelled, exact, arrival),
     }
 
 

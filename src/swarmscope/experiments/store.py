@@ -41,7 +41,7 @@ AGAIN_S = 0.01
 FIGURES = tuple(dict.fromkeys([*(m.name for m in (*METRICS, *COUNTED)), *MEASURED]))
 TEXTS = ("config", "robots", "failures", "cases", "digest", "git", "code", "swarmscope", "python", "numpy", "numba")
 JSON = ("config", "robots", "failures", "cases")
-PER_ROBOT = ("travelled_m", "shortest_m", "arrival_s")
+PER_ROBOT = ("travelled_m", "shortest_m", "any_angle_m", "arrival_s")
 SCHEMA = f"""
 CREATE TABLE IF NOT EXISTS runs (
     key TEXT PRIMARY KEY, world TEXT NOT NULL, planner_name TEXT, seed INTEGER, created TEXT DEFAULT CURRENT_TIMESTAMP,

@@ -197,6 +197,7 @@ def _per_robot(outcome: Outcome) -> dict[str, list[float | None]]:
     return {
         "travelled_m": _list(robots["length"]),
         "shortest_m": _list(outcome.references.shortest_m),
+        "any_angle_m": _list(outcome.references.any_angle_m),
         "arrival_s": _list(robots["arrival_s"]),
     }
 

@@ -45,6 +45,8 @@ METRICS: list[Metric] = [
 ]
 COUNTED: list[Metric] = [
     Metric("path_stretch_any_angle", "", "lower", "sum(l) / sum of the true shortest ways, robots that arrived"),
+    Metric("path_redundancy_any_angle", "", "lower", "gamma with the true shortest ways for l*"),
+    Metric("spl_any_angle", "", "higher", "SPL with the true shortest ways for l*"),
     Metric("mover_path_m", "m", "lower", "mean length travelled by robots that had to move and arrived (APL)"),
     Metric("mover_arrival_rate", "", "higher", "share of robots that had to move that arrived (SR)"),
     Metric("movers", "", "neither", "robots that start away from their goals"),

@@ -20,9 +20,11 @@ from swarmscope.judging.metrics import (
     mover_path_m,
     movers,
     path_lengths,
+    path_redundancy,
     path_stretch,
     side_accuracy,
     sides_judged,
+    spl,
 )
 from swarmscope.judging.provenance import own_revision, versions
 from swarmscope.judging.references import References, reference_ways
@@ -149,14 +151,16 @@ def figures(outcome: Outcome) -> dict[str, Any]:
         )
     )
     travelled = path_lengths(x, y, t_s, robots["arrival_s"])
-    stretch = path_stretch(travelled, outcome.references.any_angle_m, robots["arrival_s"])
+    exact = travelled, outcome.references.any_angle_m, robots["arrival_s"]
     arrive_m = float(getattr(outcome.setting.params, "arrive_m", ARRIVE_M))
     moved = movers(outcome.setup.starts, outcome.setup.goals, arrive_m)
     sides, told = trace.choices["side"], trace.choices["told_side"]
     simulated = len(trace.t_s) * outcome.setting.dt
     features = int(robots["sent_features"].sum())
     values |= {
-        "path_stretch_any_angle": stretch,
+        "path_stretch_any_angle": path_stretch(*exact),
+        "path_redundancy_any_angle": path_redundancy(*exact),
+        "spl_any_angle": spl(*exact),
         "mover_path_m": mover_path_m(travelled, robots["arrival_s"], moved),
         "mover_arrival_rate": mover_arrival_rate(robots["arrival_s"], moved),
         "movers": int(moved.sum()),

@@ -25,7 +25,10 @@ Floats = NDArray[np.float64]
 
 ALL = "all"
 """Stands for all places together."""
-POOLED = ("path_redundancy", "path_redundancy_all", "path_stretch", "spl")
+EXACT = "_any_angle"
+"""End of the names of figures whose reference is the true shortest way."""
+OVER_BOTH = ("path_redundancy", "path_stretch", "spl")
+POOLED = ("path_redundancy_all", *OVER_BOTH, *(name + EXACT for name in OVER_BOTH))
 OURS_COLOUR = "#0072b2"
 COLOURS = ("#e69f00", "#009e73", "#cc79a7", "#7a6fb0", "#8c6d1f", "#d55e00", "#56b4e9", "#6c757d", "#a3475c", "#4f7a28")
 """Okabe and Ito's palette with additions: told apart by colour-blind readers."""
@@ -180,13 +183,14 @@ def pooled_interval(runs: list[Run], metric: str, seed: int = 0) -> Interval:
 
 def _sums(run: Run, metric: str) -> Floats:
     """Return of one map what enters (first / fourth) (second / third): gamma (24), stretch and SPL in one form."""
-    arrived, known = np.isfinite(run.arrival_s), np.isfinite(run.shortest_m)
-    if metric == "spl":
-        best, longest = run.shortest_m[known], np.maximum(run.travelled_m[known], run.shortest_m[known])
+    reference = run.any_angle_m if metric.endswith(EXACT) else run.shortest_m
+    arrived, known = np.isfinite(run.arrival_s), np.isfinite(reference)
+    if metric.startswith("spl"):
+        best, longest = reference[known], np.maximum(run.travelled_m[known], reference[known])
         shares = np.divide(best, longest, out=np.ones_like(best), where=longest > 0.0)
         return np.array([1.0, float((shares * arrived[known]).sum()), float(known.sum()), 1.0])
     entered = known if metric == "path_redundancy_all" else known & arrived
-    shortest, travelled = float(run.shortest_m[entered].sum()), float(run.travelled_m[entered].sum())
-    if metric == "path_stretch":
+    shortest, travelled = float(reference[entered].sum()), float(run.travelled_m[entered].sum())
+    if metric.startswith("path_stretch"):
         return np.array([1.0, travelled, shortest, 1.0])
     return np.array([float(arrived.sum()), shortest, travelled, float(len(arrived))])
