@@ -22,6 +22,8 @@ TABLE_II = {
     "R3": [[54, 1.62], [83, 1.53], [128, 1.78], [177, 1.55], [231, 1.89], [282, 1.55], [302, 1.58], [359, 1.18]],
     "R2": [[15, 1.60], [43, 1.67], [117, 1.24], [179, 1.83], [285, 1.03], [341, 1.77]],
     "R4": [[8, 1.78], [109, 1.17], [176, 1.85], [237, 1.27], [300, 1.69], [329, 1.62]],
+    "R1": [[54, 1.17], [102, 1.44], [134, 1.39], [275, 1.89], [350, 1.47], [354, 1.47]],
+    "R5": [[6, 1.28], [90, 1.84], [130, 1.65], [162, 1.76], [270, 1.17], [319, 1.76]],
 }
 
 
@@ -76,6 +78,19 @@ def test_following_probability_of_r2():
 
 def test_following_probability_of_r4():
     assert following_probability(*passable("R4", True), 1.54, False) == pytest.approx(0.4137, abs=5e-5)
+
+
+@pytest.mark.parametrize(
+    ("name", "printed", "ours"),
+    [("R1", 0.395, (0.4939, 0.5061, 0.4363, 0.5637)), ("R5", 0.414, (0.5022, 0.4978, 0.4580, 0.5420))],
+)
+def test_r1_and_r5_of_table_ii_are_not_reproduced(name, printed, ours):
+    """By none of our rules: borders linear or on the chords, neighbour on the left or on the right."""
+    found = [
+        following_probability(*passable(name, chords), 1.54, left) for chords in (False, True) for left in (True, False)
+    ]
+    assert found == pytest.approx(ours, abs=5e-5)
+    assert min(abs(value - printed) for value in found) > 0.04
 
 
 def test_fusion_of_table_ii():
