@@ -122,6 +122,10 @@ def _scenario(rng: random.Random) -> dict[str, Any]:
             values[group] |= {key: value for key, value in keys.items() if rng.random() < 0.5}
     if rng.random() < 0.4:
         values["planner"] = {"name": rng.choice(["nav-scope", "dh-bug", "sfm-mas", "nav-i"]), "params": {}}
+        if rng.random() < 0.5:
+            values["planner"]["preset"] = "printed"
+    if rng.random() < 0.1:
+        values["guard"] = False
     return values
 
 
@@ -220,13 +224,15 @@ def _scan(rng: random.Random) -> tuple[str, bytes]:
 
 def _experiment() -> dict[str, Any]:
     return {
-        "name": "small", "title": "A small experiment", "seeds": "1000-1001", "scenario": {"robots": 2, "limit_s": 2.0},
+        "name": "small", "title": "A small experiment", "seeds": "1000-1001",
+        "preset": "printed", "scenario": {"robots": 2, "limit_s": 2.0},
         "places": {"near": {"task": {"name": "T1", "options": {"size_m": 5.0}}}, "ring": {"task": {"name": "T3"}}},
         "planners": {"alone": {"planner": {"name": "nav-scope", "params": {"w_i": 0.0}}}, "ours": {}},
         "sweeps": [{"name": "w_i", "planner": "ours", "key": "planner.params.w_i", "values": [0.0, 2.0]}],
         "ours": "ours", "published": [{"source": "x", "metric": "spl", "values": {"near": {"ours": 0.5}}}],
         "targets": [{"planner": "ours", "place": "near", "metric": "spl", "at_least": 0.1}], "order": ["alone", "ours"],
-        "weight": {"place": "near", "planner": "ours"}, "gap": {"worst": "alone", "best": "ours"}, "notes": ["a"],
+        "weight": {"place": "near", "planner": "ours", "keys": {"planner": {"params": {"prior": 0.0}}}},
+        "gap": {"worst": "alone", "best": "ours"}, "notes": ["a"],
     }  # fmt: skip
 
 
