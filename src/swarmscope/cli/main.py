@@ -604,6 +604,17 @@ def disk_field(
     field_command(controller, map_, permutation, robot, alone, resolution, out, call_limit)
 
 
+@disk.command("repulsion", epilog="Example: [bold]swarmscope disk repulsion report:obstacle_buffer=0.005[/bold]")
+def disk_repulsion(
+    controller: Annotated[str, typer.Argument(help="report, or report:key=value,...")] = "report",
+    out: Annotated[Path, typer.Option(help="PNG file.")] = Path("runs/disk/repulsion.png"),
+) -> None:
+    """Draw how hard the report's controller pushes away from things."""
+    from swarmscope.cli.disk import repulsion_command
+
+    repulsion_command(controller, out)
+
+
 @disk.command("start", epilog="Example: [bold]swarmscope disk start mine.py[/bold]")
 def disk_start(file: Annotated[Path, typer.Argument(help="Python file to write.")]) -> None:
     """Write a controller of your own to begin with."""
