@@ -54,6 +54,12 @@ def test_a_field(tmp_path):
     assert (tmp_path / "f.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_the_repulsion(tmp_path):
+    assert swarmscope("disk", "repulsion", "--out", tmp_path / "r.png").exit_code == 0
+    assert (tmp_path / "r.png").read_bytes().startswith(b"\x89PNG")
+    assert "is a folder" in refused("disk", "repulsion", "--out", tmp_path)
+
+
 def test_the_students_path(tmp_path):
     mine = tmp_path / "mine.py"
     assert "swarmscope disk run" in swarmscope("disk", "start", mine).stdout
@@ -96,6 +102,7 @@ def test_the_list_says_what_each_knows_and_guarantees():
         (("random", "--seeds", "nothing"), "nothing"),
         (("field", "report", "--robot", "5"), "no robot 5"),
         (("field", "planned"), "has no field"),
+        (("repulsion", "reactive"), "only 'report' has"),
     ],
 )
 def test_what_cannot_be_done_is_told(words, why, tmp_path, monkeypatch):

@@ -84,3 +84,13 @@ def test_ctrl_c_says_how_to_go_on(place, monkeypatch):
     monkeypatch.setattr("swarmscope.learning.train.train", stop)
     stopped = swarmscope("giwt", "train", *TINY, "--data", place / "data")
     assert stopped.exit_code == 130 and "goes on after the last whole epoch" in stopped.stderr
+
+
+def test_decisions_of_a_run_are_printed_and_drawn(tmp_path):
+    run, out = tmp_path / "run", tmp_path / "d.png"
+    words = ("--task", "GIWT_2", "--seed", 31003, "--limit", 8, "--no-pictures", "--out", run)
+    assert swarmscope("run", "--planner", "giwt", *words).exit_code == 0
+    assert "made no choice 99: 0, 1" in refused("giwt", "decisions", run, "--number", 99, "--out", out)
+    done = swarmscope("giwt", "decisions", run, "--number", 1, "--out", out)
+    assert done.exit_code == 0 and "itself 0.25, 14: 0.75" in done.stdout
+    assert out.read_bytes().startswith(b"\x89PNG")

@@ -15,6 +15,8 @@ from swarmscope.errors import ConfigError
         ("reactive", "again", "nan", "not between 0 and"),
         ("report", "obstacle_buffer", "-0.1", "not between 0 and"),
         ("report", "obstacle_buffer", "", "'' is not a number"),
+        ("report", "nearest", "2", "not between 0 and 1"),
+        ("report", "rim_buffer", "0.6", "not between 0 and 0.5"),
         ("navigation-function", "k", "nan", "not between"),
         ("navigation-function", "steer", "2", "not between 0 and 1"),
         ("planned", "tick", "0", "not between 1 and"),

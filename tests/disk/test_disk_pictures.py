@@ -95,3 +95,12 @@ def test_several_controllers_side_by_side():
     one = image(pictures.paths_side_by_side_png(of, 0, [("a", outcome, film)], 8000))
     two = image(pictures.paths_side_by_side_png(of, 0, [("a", outcome, film), ("b", outcome, film)], 8000))
     assert two.shape[1] == pytest.approx(2 * one.shape[1], abs=2)
+
+
+def test_the_repulsion_is_drawn_with_both_buffers():
+    params = controllers.find("report").params
+    png = pictures.repulsion_png(params)
+    assert png == pictures.repulsion_png(params)
+    assert all(has(image(png), pictures.ROBOTS[k]) for k in (0, 1, 2))
+    assert png != pictures.repulsion_png(params._replace(obstacle_buffer=0.005))
+    assert not has(image(pictures.repulsion_png(params._replace(obstacle_buffer=0.0))), pictures.ROBOTS[1])

@@ -5,6 +5,7 @@ import pytest
 
 from swarmscope.disk import controllers, maps, rules, runs
 from swarmscope.disk.contact import nearest_on_the_way
+from swarmscope.disk.controllers.report import report_velocity
 
 
 class Scripted:
@@ -114,6 +115,45 @@ def test_the_report_is_reproduced_to_the_last_step():
 def test_one_other_constant_lets_all_arrive():
     of = runs.problem(rules.Rules(), list(maps.REPORT_MAPS.values()), list(rules.all_permutations(5)))
     assert (report(of, obstacle_buffer=0.005).status == runs.ARRIVED).all()
+
+
+def one_velocity(place, goal, *obstacles, **changes):
+    params = controllers.find("report", changes).params
+    disc = np.array(obstacles, dtype=float).reshape(-1, 3)
+    return report_velocity(0, np.array([place], dtype=float), *goal, disc, 0.05, params)
+
+
+def test_several_obstacles_push_and_the_turn_asks_all_of_them_or_the_nearest():
+    # Gaps 0.2 - 0.195 = 0.005 and 0.3 - 0.292 = 0.008: pushes of 1 / 1.25e-7 = 8e6 to the left and of
+    # 1 / 5.12e-7 = 1953125 downwards, against 0.9 upwards; the third one is out of reach.
+    discs = (0.2, 0.0, 0.145), (0.0, 0.3, 0.242), (0.0, -0.8, 0.1)
+    x, y = -8e6, 0.9 - 1953125.0
+    size = np.hypot(x, y)
+    # Goal and second disc: 0.9 x 0.3 > 0.05, so the sum is turned by 90 degrees to the left.
+    assert one_velocity((0, 0), (0, 0.9), *discs) == pytest.approx((-y / size, x / size), abs=1e-12)
+    # The first one is nearest, and lies across: 0 < 0.05. The sum counts with length 1 beside the way to the goal.
+    mixed = np.array([x / size, 0.9 + y / size])
+    wanted = mixed / np.hypot(*mixed)
+    assert one_velocity((0, 0), (0, 0.9), *discs, nearest=1) == pytest.approx(tuple(wanted), abs=1e-12)
+
+
+def test_the_rim_pushes_where_it_is_asked_to():
+    # Gap 0.01: 1e6 inwards, which counts with length 1 beside the way (-0.99, 0.999).
+    x, y = -0.99 - 1e6, 0.999
+    mixed = np.array([-0.99 + x / np.hypot(x, y), 0.999 + y / np.hypot(x, y)])
+    wanted = mixed / np.hypot(*mixed)
+    assert one_velocity((0.99, 0), (0, 0.999), rim_buffer=0.02) == pytest.approx(tuple(wanted), abs=1e-12)
+    straight = np.array([-0.99, 0.999]) / np.hypot(0.99, 0.999)
+    for without in (0.0, 0.005):
+        assert one_velocity((0.99, 0), (0, 0.999), rim_buffer=without) == pytest.approx(tuple(straight), abs=1e-11)
+
+
+def test_asking_the_nearest_obstacle_only_ends_the_loops_and_brings_stalls_as_the_report_says():
+    every = list(rules.all_permutations(5))
+    outcome = report(runs.problem(rules.Rules(), [maps.NAMED["u"], maps.NAMED["minima"]], every), nearest=1)
+    arrived = (outcome.status == runs.ARRIVED).reshape(2, 120).sum(axis=1)
+    assert arrived.tolist() == [49, 120]
+    assert not np.isin(outcome.status, runs.COLLISIONS).any()
 
 
 def test_a_part_of_a_problem_has_the_same_results():

@@ -34,6 +34,7 @@ from swarmscope.learning.records import load, read_manifest, select, split_of, t
 from swarmscope.learning.scenes import robot  # noqa: E402
 from swarmscope.onboard.network.answering import draw  # noqa: E402
 from swarmscope.onboard.network.local_map import CELL_DISTANCE  # noqa: E402
+from swarmscope.viewing.key_points.attention import Asked, Attention  # noqa: E402
 
 SMALL = {"sets": ["B-I"], "channels": [4, 8, 8], "batch": 32, "threads": 1, "precision": "float32"}
 """One thread: several wait for each other most of the time where tests run beside each other."""
@@ -237,6 +238,28 @@ def test_exported_files_answer_like_pytorch(variant, tmp_path):
     checkpoints.write(path, model, {"config": chosen.model_dump(mode="json")})
     assert export.export(path, tmp_path / "out") < 1e-4
     assert json.loads((tmp_path / "out" / "model.json").read_text())["network"] == chosen.network
+
+
+@pytest.mark.parametrize("as_printed", [False, True])
+def test_attention_weights_of_exported_files_are_those_of_the_layer(as_printed, tmp_path):
+    path = write_untrained(tmp_path / "model.safetensors", network="giwt", as_printed=as_printed)
+    export.export(path, tmp_path / "out")
+    rng = np.random.default_rng(2)
+    features, cells = rng.normal(size=(4, 128)).astype(np.float32), np.array([24, 3, 30, 12])
+    gains = np.array([0.0, 0.7, 0.2, 0.9], np.float32)
+    weighed = Attention(tmp_path / "out").of(Asked(0, features, cells, gains, 0.5))
+    model = checkpoints.restore_model(checkpoints.read(path), path).eval()
+    layer, rows = model.fusion, torch.from_numpy(features)
+    with torch.no_grad():
+        # (5), then (6) in our reading: a softmax over robots of a learnt vector times LeakyReLU of the sum.
+        fused = layer.bend(layer.transform(rows) + layer.embed(torch.from_numpy(cells)))
+        pairs = layer.slope(layer.query(fused[:1]) + layer.key(fused)).unflatten(-1, (layer.heads, -1))
+        wanted = torch.softmax((pairs * layer.score).sum(-1), dim=0)
+        arrays = (torch.from_numpy(a)[None] for a in (features, cells, gains, np.ones_like(gains)))
+        logits = model.decide(*arrays)[0]
+    assert weighed.weights == pytest.approx(wanted.numpy(), abs=1e-5) and weighed.weights.shape == wanted.shape
+    assert weighed.weights.sum(axis=0) == pytest.approx(1.0) and np.ptp(weighed.weights) > 0.01
+    assert weighed.logits == pytest.approx(logits.numpy(), abs=1e-4)
 
 
 @pytest.mark.parametrize("variant", VARIANTS, ids=str)

@@ -212,6 +212,19 @@ def field_command(
     print(place)
 
 
+def repulsion_command(name: str, out: Path) -> None:
+    """Draw how hard the report's controller pushes away from a thing at any gap."""
+    from swarmscope.disk.study import pictures
+
+    choice = read_choice(name)
+    if choice.name != "report":
+        raise ConfigError(name, "has no such repulsion; only 'report' has")
+    if out.is_dir():
+        raise ConfigError(str(out), "is a folder; name the PNG file to write")
+    put_in_place(out.parent, {out.name: pictures.repulsion_png(choice.kind().params)})
+    print(out)
+
+
 def start_command(file: Path) -> None:
     """Write a controller to begin with."""
     print(f"{user.write_starter(file)} is there; try it:")

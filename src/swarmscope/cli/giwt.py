@@ -13,10 +13,12 @@ from rich.console import Console
 from rich.progress import BarColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
+from swarmscope.cli._code import announce, files_of, refuse_code
 from swarmscope.cli._console import PlainConsole
 from swarmscope.errors import ConfigError, MissingExtraError
 from swarmscope.learning.generate import DRIVEN, PLACED, generate, totals, verify
 from swarmscope.scenarios.overrides import read_value
+from swarmscope.viewing.bag.make import scenario_of
 from swarmscope.viewing.progress import Bar
 
 RADII_SAMPLES = 4_000
@@ -238,6 +240,52 @@ def export_command(run: Path, out: Path, scores: Path | None) -> None:
         bar.add_task("export", total=None, note="")
         difference = export(checkpoint, out, card)
     print(f"{out}: ONNX Runtime and PyTorch differ by at most {difference:.1e}")
+
+
+def decisions_command(run: Path, numbers: Sequence[int], count: int, out: Path, code: bool) -> None:
+    """Play a run again, print its choices with outputs and attention weights, and draw some of them."""
+    from swarmscope.learning.records import write_atomically
+    from swarmscope.viewing.key_points.again import key_points
+    from swarmscope.viewing.key_points.picture import key_points_png, most_moved
+    from swarmscope.viewing.run_data import load_run
+
+    _need("onnx", "onnxruntime")
+    found, scenario = load_run(run), scenario_of(run)
+    files = files_of([scenario])
+    if not code:
+        refuse_code(files)
+    announce(files)
+    with _bar() as bar:
+        bar.add_task("plays the run again", total=None, note="")
+        points = key_points(found, scenario)
+    by_number = {one.number: one for one in points}
+    for number in numbers:
+        if number not in by_number:
+            raise ConfigError("--number", f"the network made no choice {number}: {', '.join(map(str, by_number))}")
+    chosen = [by_number[number] for number in numbers] or most_moved(points, count)
+    if not chosen:
+        raise ConfigError(str(run), "in this run nobody chose a side with a neighbour; --number draws others")
+    _print_choices(points)
+    write_atomically(out, key_points_png(found, chosen))
+    print(out)
+
+
+def _print_choices(points: Sequence[Any]) -> None:
+    from swarmscope.viewing.key_points.picture import side_words
+
+    table = Table(title="choices of the network; attention to each robot (6), beta (8) in brackets")
+    for column in ("choice", "s", "robot", "outputs", "left", "right", "alone, left", "taken", "shortest", "attention"):
+        table.add_column(column, justify="left" if column == "attention" else "right")
+    for one in points:
+        left, right = one.outputs
+        others = zip(one.heard, one.weight[1:], one.gains, strict=True)
+        words = [f"itself {one.weight[0]:.2f}", *(f"{i}: {weight:.2f} ({gain:.2f})" for i, weight, gain in others)]
+        table.add_row(
+            str(one.number), f"{one.t_s:.1f}", str(one.robot), f"{one.logits[0]:.2f}, {one.logits[1]:.2f}",
+            f"{left:.3f}", f"{right:.3f}", f"{one.p_self:.3f}", side_words(one.side), side_words(one.true_side),
+            ", ".join(words),
+        )  # fmt: skip
+    PlainConsole(width=None if sys.stdout.isatty() else 190).print(table)
 
 
 def read_changes(changes: Sequence[str]) -> dict[str, Any]:

@@ -27,7 +27,7 @@ app.add_typer(experiments, name="experiment")
 disk = typer.Typer(no_args_is_help=True, help="Discs crossing a unit disk: compare controllers, try your own, look.")
 app.add_typer(disk, name="disk")
 
-giwt = typer.Typer(no_args_is_help=True, help="The network that picks a side: expert data, training, scores, export.")
+giwt = typer.Typer(no_args_is_help=True, help="The network that picks a side: data, training, scores, export, choices.")
 app.add_typer(giwt, name="giwt")
 
 new = typer.Typer(no_args_is_help=True, help="Begin a task or a planner of your own: one file, and a test for it.")
@@ -604,6 +604,17 @@ def disk_field(
     field_command(controller, map_, permutation, robot, alone, resolution, out, call_limit)
 
 
+@disk.command("repulsion", epilog="Example: [bold]swarmscope disk repulsion report:obstacle_buffer=0.005[/bold]")
+def disk_repulsion(
+    controller: Annotated[str, typer.Argument(help="report, or report:key=value,...")] = "report",
+    out: Annotated[Path, typer.Option(help="PNG file.")] = Path("runs/disk/repulsion.png"),
+) -> None:
+    """Draw how hard the report's controller pushes away from things."""
+    from swarmscope.cli.disk import repulsion_command
+
+    repulsion_command(controller, out)
+
+
 @disk.command("start", epilog="Example: [bold]swarmscope disk start mine.py[/bold]")
 def disk_start(file: Annotated[Path, typer.Argument(help="Python file to write.")]) -> None:
     """Write a controller of your own to begin with."""
@@ -716,6 +727,28 @@ def giwt_export(
     from swarmscope.cli.giwt import export_command
 
     export_command(run, out, scores)
+
+
+@giwt.command(
+    "decisions",
+    epilog="Examples:\n\n"
+    "[bold]swarmscope run --task GIWT_2 --planner giwt --seed 31003 --out runs/first[/bold]\n\n"
+    "[bold]swarmscope giwt decisions runs/first[/bold]\n\n"
+    "[bold]swarmscope giwt decisions runs/first --number 5 --number 10[/bold]",
+)
+def giwt_decisions(
+    run_dir: Annotated[Path, typer.Argument(help="A run folder, of planner giwt or giwt-gat.")],
+    number: Annotated[list[int] | None, typer.Option(help="Draw this choice; repeatable.")] = None,
+    count: Annotated[
+        int, typer.Option(min=1, max=12, help="Else draw so many: those that neighbours moved most.")
+    ] = 4,
+    out: Annotated[Path, typer.Option(help="PNG file.")] = Path("runs/giwt/decisions.png"),
+    no_code: NoCode = False,
+) -> None:
+    """Play a run again and show how its network chose sides: outputs, and the attention to each neighbour."""
+    from swarmscope.cli.giwt import decisions_command
+
+    decisions_command(run_dir, number or [], count, out, not no_code)
 
 
 def main() -> None:

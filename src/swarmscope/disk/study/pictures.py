@@ -1,4 +1,4 @@
-"""Pictures of the unit disk: paths of a run, clearance over time, and the field of one robot's velocities."""
+"""Pictures of the unit disk: paths of a run, clearance over time, one robot's field, the report's repulsion."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from swarmscope.disk import bounds, geodesic
+from swarmscope.disk.controllers import report
 from swarmscope.disk.maps import DiskMap
 from swarmscope.disk.rules import Floats, goals
 from swarmscope.disk.runs import COLLISIONS, STATUS_WORDS, Film, Outcome, Problem
@@ -35,6 +36,12 @@ MANY = 20
 """More robots than that are drawn thinner and without their shortest ways."""
 TRACE_STEP = 0.004
 LEVELS, POTENTIAL_POINTS = 22, 121
+PLAIN = "{x:g}"
+"""How numbers stand beside logarithmic axes: matplotlib writes powers as formulas, which are off in ``drawing``."""
+GAPS = (1e-6, 0.05)
+"""Smallest and largest gap in the picture of the repulsion [radii of the disk]."""
+FARTHEST = 2.0
+"""No goal in the disk is farther away, so no attraction is longer."""
 STUCK, ROUND_AND_ROUND, TOUCHING = "#d55e00", "#cc79a7", "#7a3ea8"
 
 
@@ -106,6 +113,7 @@ def clearance_png(of: Problem, b: int, outcome: Outcome, film: Film, label: str)
         if len(discs):
             axes.plot(step, obstacles, color="#d55e00", lw=1.5, label="to obstacles")
         axes.set_yscale("log")
+        axes.yaxis.set_major_formatter(PLAIN)
         axes.set_xlim(0, max(1, int(step[-1])))
         axes.set_xlabel("step", color=FAINT)
         axes.set_ylabel("smallest gap [radii of the disk]", color=FAINT)
@@ -208,6 +216,67 @@ def _field_legend(axes: Axes, found: Basins, potential: bool) -> None:
     axes.legend(
         handles=handles, loc="upper center", bbox_to_anchor=(0.5, 0.005), ncols=len(handles), frameon=False, fontsize=9
     )
+
+
+def repulsion_png(params: report.Params) -> bytes:
+    """Return Fig. 2 of the report as PNG: how hard a thing pushes against the gap to it, as the controller computes it.
+
+    Left on plain scales, as there; right on logarithmic ones, where the cube is a line and the floor can be seen.
+    """
+
+    def draw(figure: Any) -> None:
+        near = min(params.obstacle_buffer, params.robot_buffer)
+        plain = figure.add_axes((0.09, 0.13, 0.38, 0.68))
+        _draw_push(plain, np.linspace(0.1 * near, 1.5 * max(params[:2]), 400), params)
+        both = figure.add_axes((0.59, 0.13, 0.38, 0.68))
+        both.set_xscale("log")
+        both.set_yscale("log")
+        _draw_push(both, np.geomspace(*GAPS, 400), params)
+        both.axhline(FARTHEST, color=ROBOTS[2], lw=1.2)
+        both.text(GAPS[0], FARTHEST * 1.6, "the longest attraction", color=ROBOTS[2], fontsize=8, va="bottom")
+        both.set_xlim(*GAPS)
+        both.set_ylim(0.5, None)
+        words = (
+            f"1 / gap^3, from gaps of {report.FLOOR:g} on, added to the way to the goal; dashed: nothing is added there"
+        )
+        _title(figure, "Repulsion of the report's controller", words)
+
+    return _png(draw, (9.6, 4.4))
+
+
+def _draw_push(axes: Axes, gaps: Floats, params: report.Params) -> None:
+    """Draw the push at some gaps, whole as far as robots repel, with a line at each buffer."""
+    push = np.array([report.repulsion(1.0, float(gap)) for gap in gaps])  # the way off the thing, of length 1
+    reach = max(params.obstacle_buffer, params.robot_buffer)
+    axes.set_facecolor(GROUND)
+    axes.plot(gaps[gaps <= reach], push[gaps <= reach], color=INK, lw=1.8)
+    axes.plot(gaps[gaps >= reach], push[gaps >= reach], color=INK, lw=1.2, ls=(0, (3, 3)))
+    buffers = (
+        (params.obstacle_buffer, "obstacles", ROBOTS[1], "right"),
+        (params.robot_buffer, "robots", ROBOTS[0], "left"),
+    )
+    for buffer, what, colour, side in buffers:
+        if buffer <= 0.0:
+            continue  # no place on a logarithmic axis, and nothing is pushed
+        axes.axvline(buffer, color=colour, lw=1.2)
+        words, beside = f" {what} push below {buffer:g} ", axes.get_xaxis_transform()
+        axes.text(
+            buffer,
+            0.97,
+            words,
+            color=colour,
+            fontsize=8,
+            rotation=90,
+            ha=side,
+            va="top",
+            transform=beside,
+            clip_on=True,
+        )
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter(PLAIN)
+    axes.set_xlabel("gap [radii of the disk]", color=FAINT)
+    axes.set_ylabel("length of the push", color=FAINT)
+    _plain_axes(axes)
 
 
 def _draw_place(axes: Axes, place: DiskMap, r: float) -> None:
