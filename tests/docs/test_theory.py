@@ -8,6 +8,7 @@ import math
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
 
@@ -180,12 +181,43 @@ def test_what_the_page_says_of_the_field():
 
 def test_scan_caption(figures):
     rig, printed, ranges = figures.forest_scan()
-    x, y, _ = figures.SCAN_POSE
+    x, y, _ = chain_module().SCAN_POSE
     assert f"x = {x:.1f} m, y = {y:.2f} m" in TEXT
     target = ranges.size // 2
     assert f"a tree {ranges[target]:.1f} m ahead" in TEXT
     assert figures.safe_of(printed, ranges)[target]
     assert not figures.safe_of(rig, ranges)[target]
+
+
+@pytest.fixture(scope="module")
+def steps():
+    return chain_module().chain_of()
+
+
+def chain_module():
+    return importlib.import_module("figure_chain")
+
+
+def test_what_the_scope_filter_leaves_is_what_is_safe(figures, steps):
+    assert np.array_equal(steps.response >= steps.l_th - 1e-6, steps.safe)
+
+
+def test_the_receiver_joins_what_was_sent(figures, steps):
+    ahead = np.mod(steps.sent[0] + math.pi, 2 * math.pi) - math.pi
+    at = np.round((ahead - steps.angles[0]) / (steps.angles[1] - steps.angles[0])).astype(int) % steps.angles.size
+    assert steps.rebuilt[at] == pytest.approx(steps.sent[1], abs=0.1)
+    assert set(steps.kept[0]) < set(steps.extrema[0])
+
+
+def test_chain_caption(figures, steps):
+    x, y, _ = chain_module().CHAIN_POSE
+    off = steps.rebuilt - steps.scan
+    assert f"x = {x:.2f} m, y = {y:.2f} m" in TEXT
+    assert f"A tree {steps.scan[180]:.2f} m ahead makes {(~steps.safe).sum()} of 360 directions unsafe" in TEXT
+    assert f"of {steps.extrema[0].size} extrema\n{steps.extrema[0].size - steps.kept[0].size} maxima fall out" in TEXT
+    assert f"{steps.sent[0].size} features go out in {steps.packet_bytes} bytes" in TEXT
+    assert f"on average {np.abs(off).mean():.2f} m off the scan, mostly below it" in TEXT
+    assert (off < 0).mean() > 0.5
 
 
 def _accepted(group, keys, planner):
