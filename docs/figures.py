@@ -21,8 +21,10 @@ from swarmscope.onboard.rig import PRINTED
 
 sys.path.insert(0, str(Path(__file__).parent))
 import matplotlib.pyplot as plt
+from figure_cases import convergence, divergence
 from figure_chain import chain, features_of, filtered_by, forest_scan, safe_of
 from figure_style import BLUE, GREEN, GREY, INK, ORANGE, RED, STYLE, closed, round_the_robot
+from figure_worlds import paths, playground
 
 HALF = 30
 """Half the window of 360 beams at alpha = 60 degrees."""
@@ -279,6 +281,10 @@ FIGURES: dict[str, Callable[[], plt.Figure]] = {
     "chain": chain,
     "field": field,
     "decision": decision,
+    "playground": playground,
+    "paths": paths,
+    "convergence": convergence,
+    "divergence": divergence,
 }
 
 
