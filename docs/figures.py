@@ -1,10 +1,10 @@
-"""Makes every figure of docs/theory.md from the project's own code: ``python docs/figures.py [FOLDER]``."""
+"""Makes every figure of docs/theory.md from the project's own code: ``python docs/figures.py [FOLDER [NAME ...]]``."""
 
 from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import Any
 
@@ -15,29 +15,17 @@ from matplotlib.patches import Circle, Wedge
 from swarmscope.onboard.body import Body, protection_model
 from swarmscope.onboard.deciding.fields import interaction_force
 from swarmscope.onboard.perception.areas import passable_distance
-from swarmscope.onboard.perception.features import extrema, reconstruct
-from swarmscope.onboard.perception.filters import (
-    KAISER_BETA,
-    feature_filter,
-    filter_padded,
-    prepare_scan,
-    scope_filter,
-)
-from swarmscope.onboard.perception.safety import safe_directions
-from swarmscope.onboard.rig import AHEAD, PRINTED, Rig
-from swarmscope.scenarios.places import make_setup
-from swarmscope.scenarios.read import parse_scenario
-from swarmscope.scenarios.to_kernels import make_rig_of
-from swarmscope.sim.beams import make_beams
-from swarmscope.sim.lidar import cast_static
-from swarmscope.sim.world import compile_world
+from swarmscope.onboard.perception.features import MASK_MAXIMA, reconstruct
+from swarmscope.onboard.perception.filters import KAISER_BETA, feature_filter, scope_filter
+from swarmscope.onboard.rig import PRINTED
 
-mpl.use("Agg")
+sys.path.insert(0, str(Path(__file__).parent))
 import matplotlib.pyplot as plt
+from figure_cases import convergence, divergence
+from figure_chain import chain, features_of, filtered_by, forest_scan, safe_of
+from figure_style import BLUE, GREEN, GREY, INK, ORANGE, RED, STYLE, closed, round_the_robot
+from figure_worlds import paths, playground
 
-BLUE, ORANGE, GREEN, RED, GREY = "#0072b2", "#d55e00", "#009e73", "#cc3311", "#666666"
-SCAN_POSE = (12.0, 13.35, 0.0)
-"""Where the scan of the figure is taken in the reference forest (T1, seed 0): x, y [m], yaw [rad]."""
 HALF = 30
 """Half the window of 360 beams at alpha = 60 degrees."""
 BETAS = (0.0, 1.0, 2.5, 5.0, 8.0)
@@ -59,16 +47,6 @@ TABLE_II = {
 QUADRANTS = ((0, 36, BLUE), (-36, 0, ORANGE), (36, 90, BLUE), (-90, -36, ORANGE))
 """Quadrants I to IV of the table's robots [deg], with their colours."""
 TABLE_HALF = math.radians(36.0)
-STYLE = {
-    "figure.dpi": 110,
-    "font.size": 10,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.color": "#dddddd",
-    "axes.axisbelow": True,
-    "svg.hashsalt": "swarmscope",
-}
 
 
 def table_features(name: str) -> tuple[np.ndarray, np.ndarray, int]:
@@ -142,43 +120,10 @@ def protection() -> plt.Figure:
     return figure
 
 
-def forest_scan() -> tuple[Rig, Rig, np.ndarray]:
-    """Return the default rig, the rig with the printed rule, and a scan of the forest (T1, seed 0)."""
-    values = {"task": {"name": "T1"}, "seed": 0}
-    scenario = parse_scenario(values, "figure")
-    printed = parse_scenario(values | {"safety": {"sector": True, "look_ahead_m": 0.0}}, "figure")
-    lidar = scenario.lidar
-    world = compile_world(make_setup(scenario).world)
-    ranges = np.full(lidar.beams, np.inf, np.float32)
-    cast_static(world, *SCAN_POSE, make_beams(lidar.beams, math.radians(lidar.fov_deg), lidar.range_m), ranges)
-    return make_rig_of(scenario), make_rig_of(printed), ranges
-
-
-def safe_of(rig: Rig, ranges: np.ndarray, rule: int = AHEAD) -> np.ndarray:
-    """Return the safe directions of a scan as booleans; rule PRINTED masks the features."""
-    sensor = rig.sensor
-    edges, safe = np.zeros(ranges.size + 1, np.int16), np.zeros(ranges.size, np.uint8)
-    safe_directions(ranges, sensor, rig.reach[-1, rule], edges, safe)
-    return safe.astype(bool)
-
-
-def features_of(rig: Rig, ranges: np.ndarray, safe: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the filtered scan and the angles and distances of its features."""
-    sensor = rig.sensor
-    padded = np.zeros(ranges.size + 2 * (rig.taps.size // 2), np.float32)
-    filtered = np.zeros(ranges.size, np.float32)
-    prepare_scan(ranges, sensor.range_min, sensor.range_max, sensor.wraps, rig.taps.size // 2, padded)
-    filter_padded(padded, rig.taps, sensor.range_max, filtered)
-    angles, distances = np.zeros(16), np.zeros(16)
-    n = extrema(filtered, safe.astype(np.uint8), sensor, angles, distances)
-    return filtered, angles[:n], distances[:n]
-
-
 def scan() -> plt.Figure:
     """Draw a simulated scan with safe directions under both rules, the filtered scan and its features."""
     rig, printed, ranges = forest_scan()
     angles = rig.sensor.angle_min + rig.sensor.increment * np.arange(ranges.size)
-    circle = np.append(angles, angles[0] + 2 * math.pi)
     shown = np.minimum(ranges, rig.sensor.range_max)
     safe_default = safe_of(rig, ranges)
     panels = (
@@ -187,14 +132,8 @@ def scan() -> plt.Figure:
     )
     figure, axes = plt.subplots(1, 3, figsize=(12.5, 4.5), subplot_kw={"projection": "polar"})
     for ax in axes:
-        ax.set_theta_zero_location("N")
-        ax.set_rlim(0, 5)
-        ax.set_rticks([1, 2, 3, 4])
-        ax.set_rlabel_position(195)
-        ax.set_xticks(np.radians([0, 45, 90, 135, 180, 225, 270, 315]))
-        ax.set_xticklabels(["target", "45", "90", "135", "180", "-135", "-90", "-45"])
-        ax.tick_params(labelsize=8.5)
-        ax.plot(circle, np.append(shown, shown[0]), color="#222222", lw=1.0, label="scan")
+        round_the_robot(ax, 5, [1, 2, 3, 4])
+        ax.plot(*closed(angles, shown), color=INK, lw=1.0, label="scan")
     for ax, (title, which, safe) in zip(axes, panels, strict=False):
         width = rig.sensor.increment
         ax.bar(
@@ -209,11 +148,11 @@ def scan() -> plt.Figure:
         reach = which.look_ahead if which.look_ahead > 0 else which.protection.l_th
         ax.plot(np.linspace(0, 2 * math.pi, 200), np.full(200, reach), color=RED, lw=1.1, ls="--")
         ax.set_title(f"{title}\n{safe.sum()} of {safe.size} directions", fontsize=10.5)
-    filtered, at, distance = features_of(rig, ranges, safe_of(rig, ranges, PRINTED))
+    filtered = filtered_by(rig.taps, rig, ranges, rig.sensor.range_max)
+    at, distance = features_of(rig, filtered, safe_of(rig, ranges, PRINTED), MASK_MAXIMA)
     ax = axes[2]
-    ax.plot(circle, np.append(filtered, filtered[0]), color=BLUE, lw=1.8, label="filtered scan $y_2$")
-    loop = np.append(at, at[0] + 2 * math.pi)
-    ax.plot(loop, np.append(distance, distance[0]), color=ORANGE, lw=1.0, ls="--")
+    ax.plot(*closed(angles, filtered), color=BLUE, lw=1.8, label="filtered scan $y_2$")
+    ax.plot(*closed(at, distance), color=ORANGE, lw=1.0, ls="--")
     ax.plot(at, distance, "o", color=ORANGE, ms=6, label="features")
     ax.set_title(f"what is sent: {at.size} features\n{12 + 2 * at.size} bytes", fontsize=10.5)
     handles = {}
@@ -339,15 +278,21 @@ FIGURES: dict[str, Callable[[], plt.Figure]] = {
     "protection": protection,
     "scan": scan,
     "filters": filters,
+    "chain": chain,
     "field": field,
     "decision": decision,
+    "playground": playground,
+    "paths": paths,
+    "convergence": convergence,
+    "divergence": divergence,
 }
 
 
-def main(folder: Path) -> None:
-    """Write every figure into ``folder``."""
+def main(folder: Path, only: Collection[str] = ()) -> None:
+    """Write every figure, or ``only`` some, into ``folder``."""
     folder.mkdir(parents=True, exist_ok=True)
-    for name, draw in FIGURES.items():
+    for name in only or FIGURES:
+        draw = FIGURES[name]
         with mpl.rc_context(STYLE):
             figure = draw()
             figure.savefig(folder / f"{name}.png", bbox_inches="tight", metadata={"Software": None})
@@ -355,4 +300,4 @@ def main(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent / "figures")
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent / "figures", sys.argv[2:])

@@ -7,11 +7,15 @@ import importlib.util
 import math
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 import yaml
 
 from swarmscope.errors import SwarmscopeError
+from swarmscope.experiments.weight import NEIGHBOUR_PRINTED, SELF_PRINTED
+from swarmscope.judging.run import figures as run_figures
 from swarmscope.onboard.body import Body, protection_model
 from swarmscope.onboard.deciding.fields import (
     following_probability,
@@ -23,6 +27,7 @@ from swarmscope.onboard.deciding.fields import (
 )
 from swarmscope.onboard.perception.areas import normalise, passable_distance, quadrant_area
 from swarmscope.onboard.planners import load_planner
+from swarmscope.onboard.reasons import STATE_NAMES
 from swarmscope.scenarios.read import parse_scenario
 from swarmscope.scenarios.to_kernels import complete
 
@@ -180,12 +185,141 @@ def test_what_the_page_says_of_the_field():
 
 def test_scan_caption(figures):
     rig, printed, ranges = figures.forest_scan()
-    x, y, _ = figures.SCAN_POSE
+    x, y, _ = chain_module().SCAN_POSE
     assert f"x = {x:.1f} m, y = {y:.2f} m" in TEXT
     target = ranges.size // 2
     assert f"a tree {ranges[target]:.1f} m ahead" in TEXT
     assert figures.safe_of(printed, ranges)[target]
     assert not figures.safe_of(rig, ranges)[target]
+
+
+@pytest.fixture(scope="module")
+def steps():
+    return chain_module().chain_of()
+
+
+def chain_module():
+    return importlib.import_module("figure_chain")
+
+
+def test_what_the_scope_filter_leaves_is_what_is_safe(figures, steps):
+    assert np.array_equal(steps.response >= steps.l_th - 1e-6, steps.safe)
+
+
+def test_the_receiver_joins_what_was_sent(figures, steps):
+    ahead = np.mod(steps.sent[0] + math.pi, 2 * math.pi) - math.pi
+    at = np.round((ahead - steps.angles[0]) / (steps.angles[1] - steps.angles[0])).astype(int) % steps.angles.size
+    assert steps.rebuilt[at] == pytest.approx(steps.sent[1], abs=0.1)
+    assert set(steps.kept[0]) < set(steps.extrema[0])
+
+
+def test_chain_caption(figures, steps):
+    x, y, _ = chain_module().CHAIN_POSE
+    off = steps.rebuilt - steps.scan
+    assert f"x = {x:.2f} m, y = {y:.2f} m" in TEXT
+    assert f"A tree {steps.scan[180]:.2f} m ahead makes {(~steps.safe).sum()} of 360 directions unsafe" in TEXT
+    assert f"of {steps.extrema[0].size} extrema\n{steps.extrema[0].size - steps.kept[0].size} maxima fall out" in TEXT
+    assert f"{steps.sent[0].size} features go out in {steps.packet_bytes} bytes" in TEXT
+    assert f"on average {np.abs(off).mean():.2f} m off the scan, mostly below it" in TEXT
+    assert (off < 0).mean() > 0.5
+
+
+STALE = "run 'python docs/figures.py' and mend the caption"
+
+
+def percent(values):
+    return [f"{100.0 * value:.1f}" for value in values]
+
+
+def test_playground_caption(figures):
+    samples = importlib.import_module("figure_worlds").playground_samples()
+    wrong, choices = samples.counts[0][:2]
+    own, neighbours, weight = samples.weight.own, samples.weight.neighbours, samples.weight
+    assert f"{wrong} of {choices} are wrong" in TEXT, STALE
+    assert f"seeds {samples.seeds[0]}-{samples.seeds[-1]}" in TEXT
+    said = (
+        f"Over all, {100 * own.estimate:.1f} % of {own.used} choices\nand {100 * neighbours.estimate:.1f} % of "
+        f"{neighbours.used} opinions are wrong (printed: {100 * SELF_PRINTED:.1f} and {100 * NEIGHBOUR_PRINTED:.1f} %)"
+        f", so that by (21) the weight would be {weight.weight:.3f} "
+        f"(bootstrap over the samples: {weight.low:.3f} to {weight.high:.3f})"
+    )
+    assert said in TEXT, STALE
+
+
+def test_paths_caption(figures):
+    worlds = importlib.import_module("figure_worlds")
+    runs = worlds.printed_runs()
+    gammas = {
+        label: percent(run_figures(runs[label, task])["path_redundancy"] for task in worlds.TASKS)
+        for label in worlds.PLANNERS
+    }
+    one, other = gammas["Nav-I"], gammas["Nav-SCOPE"]
+    said = (
+        f"Nav-I has {one[0]}, {one[1]} and {one[2]} % in T1, T2, T3, Nav-SCOPE {other[0]}, {other[1]} and {other[2]} %"
+    )
+    assert said in TEXT, STALE
+    assert f"the forest of seed {worlds.FOREST_SEED}" in TEXT
+    lost = {key: int((~np.isfinite(run.trace.robots["arrival_s"])).sum()) for key, run in runs.items()}
+    assert lost == {key: int(key[1] == "T3") for key in runs}, STALE
+    assert not any(run.trace.robots["crashed"].any() for run in runs.values())
+
+
+def test_convergence_caption(figures):
+    cases = importlib.import_module("figure_cases")
+    runs = cases.map_runs()
+    shares = {
+        place: [f"{100 * cases.share_together(runs[place, label]):.0f}" for label in cases.PLANNERS]
+        for place in cases.PLACES
+    }
+    forest, rocky = shares["forest"], shares["rocky"]
+    assert f"{forest[0]}, {forest[1]} and {forest[2]} % of the ways in the forest" in TEXT, STALE
+    assert f"{rocky[0]}, {rocky[1]} and {rocky[2]} % among rocks" in TEXT, STALE
+    assert f"within {cases.TOGETHER_M:.2f} m" in TEXT
+
+
+def test_ways_that_run_together_worked_by_hand(figures):
+    cases = importlib.import_module("figure_cases")
+    points = cases.along(np.array([0.0, 1.0, 1.0]), np.array([0.0, 0.0, 0.5]))
+    assert points[[3, 12]] == pytest.approx(np.array([[0.3, 0.0], [1.0, 0.2]]))
+    steps = np.linspace(0.0, 4.0, 41)
+    x = np.column_stack([steps, steps, steps])
+    y = np.column_stack([np.zeros(41), np.where(steps < 1.95, 0.3, 2.0), np.full(41, 9.0)])
+    outcome = SimpleNamespace(trace=SimpleNamespace(records=SimpleNamespace(x=x, y=y)))
+    (_, first), (_, second), (_, third) = cases.together(outcome)
+    assert first.mean() == pytest.approx(0.56, abs=0.04)
+    assert second[:19].all() and not second[-10:].any()
+    assert not third.any()
+
+
+@pytest.mark.parametrize("at", [0, 1])
+def test_the_divergences_are_what_the_robot_heard(figures, at):
+    cases = importlib.import_module("figure_cases")
+    shown = cases.SHOWN[at]
+    drawn = cases.case_of(shown)
+    case, half = drawn.case, 0.5 * drawn.outcome.setting.rig.protection.alpha
+    sides = {n["id"]: n["side"] for n in case["neighbours"]}
+    assert (case["kind"], case["decisive"], case["side"]) == ("divergence", shown.follower_of, drawn.told), STALE
+    assert sides[shown.follower_of] == -case["side"]
+    assert sides[shown.goes_to] == case["side"]
+    threshold = normalise(drawn.outcome.setting.rig.protection.w_n, cases.RANGE_M)
+    for n in case["neighbours"]:  # P_ni follows from the polygon that is drawn
+        angles, distances, count = cases.aligned(drawn.heard[n["id"]], case["target"])
+        normal = np.array([normalise(d, cases.RANGE_M) for d in distances])
+        spans = ((0.0, half), (-half, 0.0))
+        x_1, x_2 = (passable_distance(angles, normal, count, *span, True) for span in spans)
+        assert following_probability(x_1, x_2, threshold, n["side"] > 0) == pytest.approx(n["p"], abs=1e-3)
+    assert f"$P_{{dir}}$ = {case['p_left']:.3f}" in TEXT, STALE
+    assert f"{shown.density:g} {'trees ' if at == 0 else ''}per m²" in TEXT
+
+
+def test_waits_that_follow_at_once_are_one(figures):
+    worlds = importlib.import_module("figure_worlds")
+    state = np.zeros((60, 1), np.uint8)
+    state[[5, 6, 9, 40]] = STATE_NAMES.index("yield")
+    records = SimpleNamespace(state=state, x=np.arange(60.0)[:, None], y=np.zeros((60, 1)))
+    trace = SimpleNamespace(choices=np.zeros(0), records=records)
+    marks = worlds.marks_of(SimpleNamespace(trace=trace, setting=SimpleNamespace(dt=0.2)))
+    assert marks.waits[:, 0].tolist() == [5.0, 40.0]
 
 
 def _accepted(group, keys, planner):
