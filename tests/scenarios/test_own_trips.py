@@ -122,12 +122,16 @@ def test_a_turned_map_is_the_same_building(tmp_path, hall):
     assert other.robots["arrival_s"] == pytest.approx(one.robots["arrival_s"], abs=1.0)
 
 
-def test_trips_of_a_moving_ai_map(tmp_path):
+def write_trips(folder, trips):
+    """Write a.map, a hall of 12 x 8 cells with walls round it, and a.scen."""
     rows = ["@" * 12] + ["@" + "." * 10 + "@"] * 6 + ["@" * 12]
-    (tmp_path / "a.map").write_text("type octile\nheight 8\nwidth 12\nmap\n" + "\n".join(rows) + "\n")
-    trips = [(1, 1, 9, 6), (2, 3, 10, 1), (10, 6, 1, 6)]
+    (folder / "a.map").write_text("type octile\nheight 8\nwidth 12\nmap\n" + "\n".join(rows) + "\n")
     lines = [f"0\ta.map\t12\t8\t{x}\t{y}\t{p}\t{q}\t9" for x, y, p, q in trips]
-    (tmp_path / "a.scen").write_text("version 1\n" + "\n".join(lines) + "\n")
+    (folder / "a.scen").write_text("version 1\n" + "\n".join(lines) + "\n")
+
+
+def test_trips_of_a_moving_ai_map(tmp_path):
+    write_trips(tmp_path, [(1, 1, 9, 6), (2, 3, 10, 1), (10, 6, 1, 6)])
     place = "map: {file: a.map, resolution_m: 0.5, trips: a.scen, first_trip: 1}\nrobots: 2\n"
     (tmp_path / "s.yaml").write_text(place)
     setup = make_setup(load_scenario(tmp_path / "s.yaml"))
@@ -145,11 +149,7 @@ def test_trips_of_a_moving_ai_map(tmp_path):
 
 
 def test_a_trip_that_ends_in_a_wall_is_named_as_a_trip(tmp_path):
-    rows = ["@" * 12] + ["@" + "." * 10 + "@"] * 6 + ["@" * 12]
-    (tmp_path / "a.map").write_text("type octile\nheight 8\nwidth 12\nmap\n" + "\n".join(rows) + "\n")
-    trips = [(1, 1, 9, 6), (2, 3, 10, 1), (10, 6, 0, 6)]
-    lines = [f"0\ta.map\t12\t8\t{x}\t{y}\t{p}\t{q}\t9" for x, y, p, q in trips]
-    (tmp_path / "a.scen").write_text("version 1\n" + "\n".join(lines) + "\n")
+    write_trips(tmp_path, [(1, 1, 9, 6), (2, 3, 10, 1), (10, 6, 0, 6)])
     (tmp_path / "s.yaml").write_text("map: {file: a.map, resolution_m: 0.5, trips: a.scen, first_trip: 1}\n")
     with pytest.raises(ConfigError, match=r"map\.trips: goal of trip 2: "):
         make_setup(load_scenario(tmp_path / "s.yaml"))
