@@ -144,10 +144,10 @@ def _value(field: Field, value: Any, where: str) -> Value:
 
 
 def number_of(value: Any) -> float:
-    """Return a number, or what text says in plain digits; NaN for anything else."""
+    """Return a number, or what text says in plain digits, minus zero as zero; NaN for anything else."""
     if isinstance(value, str) and ("_" in value or not value.isascii()):
         return math.nan
     if isinstance(value, int | float | str) and not isinstance(value, bool):
         with suppress(ValueError, OverflowError):
-            return float(value)
+            return float(value) + 0.0
     return math.nan

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import errno
+import math
 import os
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -14,6 +16,11 @@ from command_line import refused, swarmscope
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from fuzz_inputs import fuzz
 from swarmscope.cli._errors import FAULT, TRACEBACK, _words
+from swarmscope.errors import SwarmscopeError
+from swarmscope.scenarios.places import make_setup
+from swarmscope.scenarios.read import parse_scenario
+from swarmscope.tasks import load_task, task_names
+from swarmscope.tasks._contract import option_fields
 
 TREES = ["run", "--task", "T1", "--robots", "2"]
 
@@ -48,6 +55,22 @@ def test_a_part_of_the_fuzzing():
 )
 def test_values_that_were_tracebacks_or_hangs_name_their_key(change, key):
     assert key in refused(*TREES, "--set", change)
+
+
+@pytest.mark.parametrize("name", task_names())
+def test_minus_zero_is_zero(name):
+    """As a length it made a random generator fail: -0.0 is not below 0.0, and less than it."""
+    for key, field in option_fields(load_task(name)).items():
+        if field.kind is not float or field.bounds.low > 0.0:
+            continue
+        said = []
+        for value in (0.0, -0.0):
+            with suppress(SwarmscopeError):
+                scenario = parse_scenario({"task": {"name": name, "options": {key: value}}, "robots": 2}, "test")
+                said.append(make_setup(scenario).starts.tolist())
+        assert len(said) in (0, 2) and said[:1] == said[1:]
+    noise = parse_scenario({"task": {"name": name}, "noise": {"nan": -0.0}}, "test").noise
+    assert math.copysign(1.0, noise.nan) == 1.0
 
 
 @pytest.mark.parametrize(

@@ -21,12 +21,12 @@ from swarmscope.sim.world import LONGEST_M, Obstacle, WorldSpec
 
 
 def _only_numbers(value: Any) -> Any:
-    """Refuse what Python would take for a number: true is no 1, and text is text."""
+    """Refuse what Python would take for a number: true is no 1, and text is text. Minus zero becomes zero."""
     if isinstance(value, bool | str | bytes):
         raise ValueError(f"must be a number, not {value!r}" if not isinstance(value, bool) else "must be a number")
     if isinstance(value, float) and not math.isfinite(value):
         raise ValueError("must be a finite number")
-    return value
+    return value + 0.0 if isinstance(value, float) else value
 
 
 NUMBER: Final = BeforeValidator(_only_numbers)
