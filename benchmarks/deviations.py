@@ -5,7 +5,7 @@ python benchmarks/deviations.py --planner nav-scope --seeds 0-99
 A row of the table is one thing that `planner.preset=printed` changes (`DEVIATIONS`). "Ours, this as printed" is the
 planner as it is by default but for that; "printed, this as ours" is the preset but for that. Differences are γ (24) in
 points, map by map, with a 95 % bootstrap interval and the p value of the sign-flip test, corrected for all tests of the
-column (Holm).
+table (Holm).
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from swarmscope.judging.statistics import PairedDifference, paired_difference
 from swarmscope.onboard.planners import load_planner
 from swarmscope.scenarios.read import parse_scenario
 from swarmscope.scenarios.to_kernels import complete
-from swarmscope.viewing.report.words import holm
+from swarmscope.viewing.report.words import EVIDENCE, holm
 
 TASKS = ("T1", "T2", "T3")
 DEVIATIONS = {
@@ -54,7 +54,6 @@ DEVIATIONS = {
 }
 """Things that belong together, with their keys."""
 
-EVIDENCE = 0.05
 Changes = tuple[str, ...]
 Runs = dict[str, list[dict[str, Any]]]
 """By task, in the order of the seeds."""
@@ -143,7 +142,7 @@ def main() -> None:
         print(f"| {name} | " + " | ".join(gamma(runs[name][task]) for task in TASKS) + " |")
     for base, begin in (("ours", "ours, this as printed"), ("printed", "printed, this as ours")):
         print_differences(begin, runs[base], {words: runs[f"{base} {words}"] for words in parts})
-    print("\n\\* Holm's p below 0.05.")
+    print(f"\n\\* Holm's p below {EVIDENCE}.")
 
 
 if __name__ == "__main__":

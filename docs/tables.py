@@ -21,7 +21,6 @@ from swarmscope.judging.statistics import PairedDifference
 from swarmscope.viewing.report import words
 from swarmscope.viewing.report.material import Material
 
-EVIDENCE = 0.05
 MINUS = str.maketrans("-", "−")
 
 
@@ -68,7 +67,8 @@ def differences(material: Material, metric: str) -> str:
     others = [planner for planner in material.planners if planner != ours]
     found = {(other, place): material.paired(place, ours, other, metric) for other in others for place in places}
     sure = dict(zip(found, words.holm([one.p_value for one in found.values()]), strict=True))
-    head = f"{words.title(metric)} of {ours} minus that of the others, map by map (\\* Holm's p below {EVIDENCE}):"
+    sign = f"\\* Holm's p below {words.EVIDENCE}"
+    head = f"{words.title(metric)} of {ours} minus that of the others, map by map ({sign}):"
     lines = [head, "", "| | " + " | ".join(places) + " |", "|---" * (len(places) + 1) + "|"]
     for other in others:
         cells = [_difference(metric, found[other, place], sure[other, place]) for place in places]
@@ -79,7 +79,7 @@ def differences(material: Material, metric: str) -> str:
 def _difference(metric: str, found: PairedDifference, p_value: float) -> str:
     if not math.isfinite(found.low):
         return ""
-    star = "\\*" if p_value < EVIDENCE else ""
+    star = "\\*" if p_value < words.EVIDENCE else ""
     return f"{words.difference(metric, found.estimate)} {words.interval(metric, found, True)}{star}".translate(MINUS)
 
 
