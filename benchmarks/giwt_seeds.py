@@ -24,7 +24,9 @@ from swarmscope.learning.evaluate import judge, open_trained, read_test
 from swarmscope.learning.generate import PLACED
 from swarmscope.learning.train import train
 
-SMALL = {"sets": PLACED, "epochs": 4, "samples_per_epoch": 30_000, "validation_samples": 8_000}
+SMALL = {
+    "sets": PLACED, "channels": (8, 16, 32), "epochs": 4, "samples_per_epoch": 15_000, "validation_samples": 6_000,
+}  # fmt: skip
 VARIANTS: dict[str, dict[str, Any]] = {
     "CNN": {"network": "cnn"},
     "GraphSAGE": {"network": "graphsage"},
