@@ -1,0 +1,176 @@
+"""From scans to the map: what beams hit is set, what all beams over a near cell pass is cleared.
+
+A wall that fills a part of a cell is hit from here and passed from there, and a robot whose map comes and goes with
+that commutes. So a cell counts as passed only when every beam across it ends behind it, only near, and the less the
+more often it has come back.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from swarmscope._jit import jit, jit_inline, jit_inner
+from swarmscope.geometry import point_segment_distance, rough_angle
+from swarmscope.onboard.mapping.cells import clear_cell, is_set, row_of, set_cell
+from swarmscope.onboard.mapping.memory import NEAR
+from swarmscope.onboard.mapping.words import WORD, ZERO, bit, lowest, window, without_lowest
+from swarmscope.onboard.percept import Row
+from swarmscope.onboard.view import View
+
+HIT, PASSED, MOST = 4, 4, 15
+SURE = 12
+"""Of a cell that was seen before it came near."""
+CLEARS_WITHIN_M = 2.5
+EVERY = 4
+"""A cell is looked at for being passed in one tick of so many."""
+HALF_DIAGONAL = math.sqrt(0.5)
+
+
+@jit
+def learn(see: View, memory: Row, cell_m: float, deep_m: float) -> None:
+    """Take this tick's scan into the map. Cells that close the way are noted in ``closed``, others gone in
+    ``opened``."""
+    shared, rig = see.shared, see.rig
+    u, v = shared["x"] / cell_m, shared["y"] / cell_m
+    _move_near(memory, int(math.floor(u)), int(math.floor(v)))
+    c, s = math.cos(see.percept["compass"]) / cell_m, math.sin(see.percept["compass"]) / cell_m
+    first, last = 0, rig.sensor.beams - 1
+    if rig.sensor.field > 0:
+        first, last = shared["view_first"], shared["view_last"]
+    was_x, was_y = -(2**40), -(2**40)
+    for n in range(first, last + 1):
+        r = see.masked[n]
+        if not (rig.sensor.range_min <= r < rig.sensor.range_max) or see.unseen[n] != 0:
+            continue
+        bx, by = rig.cos[n], rig.sin[n]
+        eu, ev = c * bx - s * by, s * bx + c * by
+        hu, hv = u + r * eu, v + r * ev
+        ix, iy = int(math.floor(hu)), int(math.floor(hv))
+        if (ix == was_x and iy == was_y) or (memory["stand_n"] > 0 and _on_standing(memory, hu, hv, rig.footprint / cell_m)):
+            continue
+        was_x, was_y = ix, iy
+        if _hit(memory, ix, iy) and _closes(memory, u, v, ix + 0.5, iy + 0.5):
+            memory["closed"] = 1
+        if deep_m > 0.0:
+            ix, iy = int(math.floor(hu + deep_m * eu)), int(math.floor(hv + deep_m * ev))
+            if _hit(memory, ix, iy) and _closes(memory, u, v, ix + 0.5, iy + 0.5):
+                memory["closed"] = 1
+    _clear_passed(see, memory, cell_m)
+    memory["ticks"] += 1
+
+
+@jit_inner
+def _on_standing(memory: Row, hu: float, hv: float, own: float) -> bool:
+    """Tell whether a return [cells] may be that of a robot that stands."""
+    for k in range(memory["stand_n"]):
+        reach = memory["stand_r"][k] - own + 2.0
+        if (hu - memory["stand_u"][k]) ** 2 + (hv - memory["stand_v"][k]) ** 2 < reach * reach:
+            return True
+    return False
+
+
+@jit_inline
+def _hit(memory: Row, ix: int, iy: int) -> bool:
+    """Count a hit; return whether the cell is new in the map."""
+    near = abs(ix - memory["near_x"]) < NEAR // 2 and abs(iy - memory["near_y"]) < NEAR // 2
+    known = is_set(memory, ix, iy)
+    if near:
+        e = np.int64(memory["evidence"][iy & (NEAR - 1), ix & (NEAR - 1)])
+        again = e >> 4
+        sure = min(MOST, (e & 15 if known else 0) + HIT * (1 + again))
+        memory["evidence"][iy & (NEAR - 1), ix & (NEAR - 1)] = (again << 4) | sure
+    if known:
+        return False
+    set_cell(memory, ix, iy)
+    return True
+
+
+@jit_inner
+def _closes(memory: Row, u: float, v: float, hu: float, hv: float) -> bool:
+    """Tell whether something at (hu, hv) [cells] is in the way."""
+    au, av = u, v
+    for k in range(memory["way_n"]):
+        bu, bv = memory["way_u"][k], memory["way_v"][k]
+        if point_segment_distance(hu, hv, au, av, bu, bv) < memory["disc_r"]:
+            return True
+        au, av = bu, bv
+    return False
+
+
+@jit
+def _move_near(memory: Row, cx: int, cy: int) -> None:
+    """Let the square of known evidence follow the robot to cell (cx, cy); what comes in is as the map has it."""
+    if cx == memory["near_x"] and cy == memory["near_y"]:
+        return
+    dx, dy = cx - memory["near_x"], cy - memory["near_y"]
+    memory["near_x"], memory["near_y"] = cx, cy
+    half = NEAR // 2
+    for k in range(min(NEAR, abs(dx))):
+        ix = cx + half - 1 - k if dx > 0 else cx - half + k
+        for iy in range(cy - half, cy + half):
+            memory["evidence"][iy & (NEAR - 1), ix & (NEAR - 1)] = SURE if is_set(memory, ix, iy) else 0
+    for k in range(min(NEAR, abs(dy))):
+        iy = cy + half - 1 - k if dy > 0 else cy - half + k
+        for ix in range(cx - half, cx + half):
+            memory["evidence"][iy & (NEAR - 1), ix & (NEAR - 1)] = SURE if is_set(memory, ix, iy) else 0
+
+
+@jit
+def _clear_passed(see: View, memory: Row, cell_m: float) -> None:
+    """Look at some of the near cells in the map for whether all beams pass them."""
+    u, v = see.shared["x"] / cell_m, see.shared["y"] / cell_m
+    reach = min(NEAR // 2 - 1, int(CLEARS_WITHIN_M / cell_m))
+    x0 = memory["near_x"] - reach
+    mask = bit(2 * reach + 1) - bit(0)
+    for iy in range(memory["near_y"] - reach, memory["near_y"] + reach + 1):
+        if (iy + memory["ticks"]) % EVERY != 0:
+            continue
+        row = window(row_of(memory, x0, iy), row_of(memory, x0 + WORD, iy), x0 & (WORD - 1)) & mask
+        while row != ZERO:
+            ix = x0 + lowest(row)
+            row = without_lowest(row)
+            if _is_passed(see, ix + 0.5 - u, iy + 0.5 - v, cell_m):
+                _pass(memory, ix, iy)
+
+
+@jit_inline
+def _is_passed(see: View, du: float, dv: float, cell_m: float) -> bool:
+    """Tell whether every beam across the cell that lies (du, dv) [cells] from here ends behind it."""
+    sensor = see.rig.sensor
+    d = cell_m * math.sqrt(du * du + dv * dv)
+    if d < see.rig.body.radius_m - HALF_DIAGONAL * cell_m:
+        return True
+    c, s = math.cos(see.percept["compass"]), math.sin(see.percept["compass"])
+    x, y = c * du + s * dv, c * dv - s * du
+    half = HALF_DIAGONAL * cell_m
+    behind = d + half + 0.5 * cell_m + 3.0 * sensor.range_sigma * d
+    if behind >= sensor.range_max:
+        return False
+    middle = (rough_angle(x, y + 1e-12) - sensor.angle_min) / sensor.increment
+    wide = math.asin(min(1.0, half / max(d, half))) / sensor.increment
+    for k in range(int(math.floor(middle - wide)), int(math.ceil(middle + wide)) + 1):
+        n = k
+        if sensor.wraps and n < 0:
+            n += sensor.beams
+        elif sensor.wraps and n >= sensor.beams:
+            n -= sensor.beams
+        if n < 0 or n >= sensor.beams or see.unseen[n] != 0 or not see.scan[n] >= behind:
+            return False
+        if sensor.field > 0 and not see.shared["view_first"] <= n <= see.shared["view_last"]:
+            return False
+    return True
+
+
+@jit_inner
+def _pass(memory: Row, ix: int, iy: int) -> None:
+    """Count that a cell was passed; it leaves the map when nothing is left of what speaks for it."""
+    e = np.int64(memory["evidence"][iy & (NEAR - 1), ix & (NEAR - 1)])
+    again, sure = e >> 4, e & 15
+    sure = max(0, sure - max(1, PASSED >> again))
+    if sure == 0:
+        clear_cell(memory, ix, iy)
+        again = min(3, again + 1)
+        memory["opened"] = 1
+    memory["evidence"][iy & (NEAR - 1), ix & (NEAR - 1)] = (again << 4) | sure

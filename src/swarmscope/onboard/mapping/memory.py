@@ -1,0 +1,66 @@
+"""What a robot that remembers keeps: its map, the way that it goes, and the scratch of its searches."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from swarmscope.onboard.mapping.cells import DIRECTORY, DISC_ROWS, PAGES, QUARTERS
+from swarmscope.onboard.mapping.words import WORD
+from swarmscope.onboard.percept import NEVER_S, PEERS
+
+NEAR = 64
+"""Cells on a side of the square round the robot in which it is known how sure each cell is."""
+CORNERS = 64
+"""Of a way, the goal included."""
+SCRATCH = 12288
+"""Words for searches; places up to 64 m x 64 m take the first 3072."""
+
+MAP = np.dtype(
+    [
+        ("page_at", np.uint8, (DIRECTORY, DIRECTORY)),  # 1 + its slot, 0 = there is none
+        ("page_x", np.int32, PAGES),
+        ("page_y", np.int32, PAGES),
+        ("pages_n", np.int64),
+        ("rows", np.uint64, (PAGES, WORD)),
+        ("disc", np.uint64, (QUARTERS, QUARTERS, DISC_ROWS)),  # what must be free round a robot
+        ("disc_half", np.int64),  # rows that it has on either side of its middle, 0 = not yet drawn
+        ("disc_r", np.float64),  # its radius [cells]
+        # how sure: 0 to 15, and in the upper four bits how often the cell has come back
+        ("evidence", np.uint8, (NEAR, NEAR)),
+        ("near_x", np.int64),  # the robot's cell when the square was last moved
+        ("near_y", np.int64),
+        ("ticks", np.int64),
+        # robots that stand for long: not in the map, but in the way
+        ("stand_n", np.int64),
+        ("stand_u", np.float64, PEERS),  # [cells]
+        ("stand_v", np.float64, PEERS),
+        ("stand_r", np.float64, PEERS),  # how far the robot's middle keeps away [cells]
+        # the way: corners still ahead, the goal last [cells]
+        ("way_u", np.float64, CORNERS),
+        ("way_v", np.float64, CORNERS),
+        ("way_n", np.int64),  # 0 = there is none
+        ("closed", np.uint8),  # something has been seen in it
+        ("opened", np.uint8),  # something is gone that was in the map
+        ("searched_s", np.float64),
+        ("searches", np.int64),
+        ("floods", np.int64),
+        ("failures", np.int64),
+        ("scratch", np.uint64, SCRATCH),
+        ("scratch_n", np.int64),  # words of it that have been used
+        ("failed", np.uint8),  # the last search had to forget something
+        ("arrived", np.uint8),
+        # a robot that does not get away from where it is
+        ("held_u", np.float64),
+        ("held_v", np.float64),
+        ("held_s", np.float64),
+        ("leave_s", np.float64),  # until when it leaves along the longest corridor
+        ("leave", np.float64),  # compass frame [rad]
+    ]
+)
+
+
+def new_memory(robots: int) -> np.ndarray:
+    """Return the memory of ``robots`` robots that have seen nothing yet."""
+    memory = np.zeros(robots, MAP)
+    memory["searched_s"] = memory["held_s"] = memory["leave_s"] = NEVER_S
+    return memory

@@ -1,0 +1,129 @@
+"""The way that a robot goes: found when it has none or something closes it, kept taut, shortened as it is gone."""
+
+from __future__ import annotations
+
+import math
+
+from swarmscope._jit import jit, jit_inline, jit_inner
+from swarmscope.onboard.mapping.cells import draw_disc, forget_all, is_open, open_way
+from swarmscope.onboard.mapping.flood import flood
+from swarmscope.onboard.mapping.memory import CORNERS
+from swarmscope.onboard.mapping.search import FOUND, TOO_MANY, shortest
+from swarmscope.onboard.percept import Row
+
+HALVINGS = 4
+SWEEPS = 2
+GOAL_WITHIN = 8
+"""A goal that is not open is gone to as near as a place so many cells from it."""
+
+
+@jit
+def find_way(memory: Row, u0: float, v0: float, u1: float, v1: float) -> bool:
+    """Search a way from (u0, v0) to (u1, v1) [cells]; return whether there is one. The old one stays if not."""
+    memory["searches"] += 1
+    gu, gv = _goal_place(memory, u1, v1)
+    found = shortest(memory, u0, v0, gu, gv)
+    ok = found == FOUND
+    if found == TOO_MANY:
+        memory["floods"] += 1
+        ok = flood(memory, u0, v0, gu, gv)
+    if not ok:
+        memory["failures"] += 1
+        return False
+    memory["closed"] = 0
+    tighten(memory, u0, v0)
+    n = memory["way_n"]
+    if gu != u1 or gv != v1:
+        n = min(CORNERS, n + 1)
+        memory["way_u"][n - 1], memory["way_v"][n - 1] = u1, v1
+        memory["way_n"] = n
+    return True
+
+
+@jit_inner
+def _goal_place(memory: Row, u: float, v: float) -> tuple[float, float]:
+    """Return the goal, or where it is not open the nearest open place to it."""
+    if is_open(memory, u, v):
+        return u, v
+    best, at_u, at_v = math.inf, u, v
+    for y in range(-GOAL_WITHIN, GOAL_WITHIN + 1):
+        for x in range(-GOAL_WITHIN, GOAL_WITHIN + 1):
+            d = x * x + y * y
+            if d < best and is_open(memory, u + x, v + y):
+                best, at_u, at_v = d, u + x, v + y
+    return at_u, at_v
+
+
+@jit
+def tighten(memory: Row, u0: float, v0: float) -> None:
+    """Pull the corners of the way towards the straight line, as far as it stays open."""
+    for _ in range(SWEEPS):
+        au, av = u0, v0
+        k = 0
+        while k < memory["way_n"] - 1:
+            cu, cv = memory["way_u"][k], memory["way_v"][k]
+            bu, bv = memory["way_u"][k + 1], memory["way_v"][k + 1]
+            if open_way(memory, au, av, bu, bv):
+                drop_first(memory, k)
+                continue
+            # the foot of the corner on the line from a to b
+            du, dv = bu - au, bv - av
+            t = ((cu - au) * du + (cv - av) * dv) / max(1e-9, du * du + dv * dv)
+            t = min(1.0, max(0.0, t))
+            fu, fv = au + t * du, av + t * dv
+            low, high = 0.0, 1.0
+            for _ in range(HALVINGS):
+                s = 0.5 * (low + high)
+                mu, mv = cu + s * (fu - cu), cv + s * (fv - cv)
+                if open_way(memory, au, av, mu, mv) and open_way(memory, bu, bv, mu, mv) and is_open(memory, mu, mv):
+                    low = s
+                else:
+                    high = s
+            memory["way_u"][k], memory["way_v"][k] = cu + low * (fu - cu), cv + low * (fv - cv)
+            au, av = memory["way_u"][k], memory["way_v"][k]
+            k += 1
+
+
+@jit_inline
+def drop_first(memory: Row, k: int) -> None:
+    """Drop corner ``k``."""
+    for i in range(k, memory["way_n"] - 1):
+        memory["way_u"][i], memory["way_v"][i] = memory["way_u"][i + 1], memory["way_v"][i + 1]
+    memory["way_n"] -= 1
+
+
+@jit_inline
+def way_length(memory: Row, u0: float, v0: float) -> float:
+    """Return how long the way is from (u0, v0) [cells]."""
+    length, au, av = 0.0, u0, v0
+    for k in range(memory["way_n"]):
+        bu, bv = memory["way_u"][k], memory["way_v"][k]
+        length += math.sqrt((bu - au) ** 2 + (bv - av) ** 2)
+        au, av = bu, bv
+    return length
+
+
+@jit
+def forget_and_find(memory: Row, u0: float, v0: float, u1: float, v1: float) -> int:
+    """Find a way though the map closes everything: forget first who stands, then ask for less room, then all cells.
+
+    Return how far that went, 0 to 3.
+    """
+    if find_way(memory, u0, v0, u1, v1):
+        return 0
+    if memory["stand_n"] > 0:
+        stood = memory["stand_n"]
+        memory["stand_n"] = 0
+        ok = find_way(memory, u0, v0, u1, v1)
+        memory["stand_n"] = stood
+        if ok:
+            return 1
+    full = memory["disc_r"]
+    draw_disc(memory, full - 0.6)
+    ok = find_way(memory, u0, v0, u1, v1)
+    draw_disc(memory, full)
+    if ok:
+        return 2
+    forget_all(memory)
+    find_way(memory, u0, v0, u1, v1)
+    return 3

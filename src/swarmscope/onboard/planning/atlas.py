@@ -1,0 +1,210 @@
+"""Atlas: a robot that remembers what it has seen closed, and goes the shortest way through the rest.
+
+The map holds cells in which something stands, in the frame of the robot's own odometry and compass; what it does not
+know counts as free. It goes along the shortest way to the goal that is open by that map, heads for the way's first
+corner, and searches again only when something closes the way or leaves a shorter one open. Robots that stand for long
+are in the way but not in the map. The safe directions and the guard are beneath, as with all planners.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, NamedTuple
+
+from swarmscope._jit import jit, jit_inline, jit_inner
+from swarmscope.bounds import Bounds, Metres, Seconds
+from swarmscope.geometry import wrap_angle
+from swarmscope.onboard.control.unicycle import arrival_speed
+from swarmscope.onboard.control.wanting import halt, head_for
+from swarmscope.onboard.deciding.following import away_from_nearest
+from swarmscope.onboard.mapping.cells import draw_disc, open_way
+from swarmscope.onboard.mapping.evidence import learn
+from swarmscope.onboard.mapping.memory import MAP, new_memory
+from swarmscope.onboard.mapping.way import drop_first, find_way, forget_and_find, way_length
+from swarmscope.onboard.percept import PEERS, Row
+from swarmscope.onboard.perception.corridor import corridor_length
+from swarmscope.onboard.perception.safety import safe_directions
+from swarmscope.onboard.reasons import ADVANCE, ARRIVED, ESCAPE, FIRST_OWN, FOLLOW, R_ARRIVED, R_FREE, R_LOST
+from swarmscope.onboard.rig import ESCAPE as ESCAPE_RULE
+from swarmscope.onboard.rig import NARROW
+from swarmscope.onboard.sharing.tracks import moves
+from swarmscope.onboard.view import View
+
+__all__ = ["MEMORY", "NAME", "NEEDS", "REASONS", "SUMMARY", "Params", "decide", "new_memory"]
+
+NAME = "atlas"
+SUMMARY = "Atlas: remembers what it has seen closed and goes the shortest way through the rest"
+NEEDS = "own scan, goal bearing and distance, relative poses of visible neighbours, odometry and compass"
+MEMORY = MAP
+REASONS = (
+    "goes to the next corner of its way",
+    "heads beside the next corner: something is between",
+    "no way is open by its map: has forgotten what closed it",
+    "has not got away from here: leaves where there is most room",
+)
+R_CORNER, R_BESIDE, R_FORGOT, R_LEAVES = range(FIRST_OWN, FIRST_OWN + 4)
+
+
+class Params(NamedTuple):
+    """What can be set. Distances in m, times in s."""
+
+    cell_m: Annotated[float, Bounds(0.03, 1.0, "m")] = 0.125
+    """Side of a cell of the map."""
+    margin_m: Metres = 0.13
+    """Kept between the body and the middle of what stands in a cell."""
+    room_m: Metres = 0.021
+    """Kept beside the body where the way is driven."""
+    deep_m: Metres = 0.08
+    """What is hit is at least so deep."""
+    arrive_m: Metres = 0.05
+    """Distance to the goal at which a robot has arrived."""
+    still_s: Seconds = 2.0
+    """A neighbour that has not moved for so long is an obstacle."""
+    again_s: Seconds = 1.0
+    """Time between two searches for a shorter way, or for one where there was none."""
+    gain_m: Metres = 0.3
+    """A way that has opened is taken when it is shorter by so much."""
+    held_s: Seconds = 3.0
+    """A robot that has not moved for so long leaves along the longest corridor."""
+
+
+@jit_inline
+def decide(see: View, memory: Row, params: Params) -> None:
+    """Learn, keep the way open and short, and head for its next corner."""
+    cell = params.cell_m
+    percept, shared = see.percept, see.shared
+    if memory["disc_half"] == 0:
+        memory["disc_r"] = (see.rig.body.radius_m + params.margin_m) / cell
+        draw_disc(memory, memory["disc_r"])
+    if memory["arrived"] or percept["goal_distance"] <= params.arrive_m:
+        memory["arrived"] = 1
+        halt(see)
+        see.out["state"], see.out["reason"], see.out["side"] = ARRIVED, R_ARRIVED, 0
+        return
+    _note_standing(see, memory, params.still_s, cell)
+    learn(see, memory, cell, params.deep_m)
+    u, v = shared["x"] / cell, shared["y"] / cell
+    toward = percept["compass"] + percept["goal_bearing"]
+    far = percept["goal_distance"] / cell
+    gu, gv = u + far * math.cos(toward), v + far * math.sin(toward)
+    forgot = _keep_way(see, memory, params, u, v, gu, gv)
+    _drive(see, memory, params, u, v, forgot)
+
+
+@jit_inner
+def _note_standing(see: View, memory: Row, still_s: float, cell: float) -> None:
+    """Note where neighbours stand for long."""
+    shared, n = see.shared, 0
+    for t in range(PEERS):
+        if shared["track_id"][t] < 0 or moves(see.percept, shared, t, still_s):
+            continue
+        memory["stand_u"][n] = (shared["x"] + shared["track_x"][t]) / cell
+        memory["stand_v"][n] = (shared["y"] + shared["track_y"][t]) / cell
+        memory["stand_r"][n] = (shared["track_radius"][t] + see.rig.footprint) / cell
+        n += 1
+    if n > memory["stand_n"]:
+        memory["closed"] = 1
+    elif n < memory["stand_n"]:
+        memory["opened"] = 1
+    memory["stand_n"] = n
+
+
+@jit
+def keep_way(memory: Row, now: float, u: float, v: float, gu: float, gv: float, again_s: float, gain: float) -> int:
+    """Search when there is no way, the way is closed, or a shorter one may have opened; return what was forgotten."""
+    n = memory["way_n"]
+    if n > 0:
+        memory["way_u"][n - 1], memory["way_v"][n - 1] = gu, gv
+    while memory["way_n"] > 1 and (
+        (memory["way_u"][0] - u) ** 2 + (memory["way_v"][0] - v) ** 2 < 0.25
+        or open_way(memory, u, v, memory["way_u"][1], memory["way_v"][1])
+    ):
+        drop_first(memory, 0)
+    due = now - memory["searched_s"] >= again_s
+    if memory["way_n"] == 0 or memory["closed"]:
+        if memory["failed"] and not due:
+            return 0
+        memory["searched_s"], memory["opened"] = now, 0
+        forgot = forget_and_find(memory, u, v, gu, gv)
+        memory["failed"] = forgot > 0
+        return forgot
+    if due and (memory["opened"] or not open_way(memory, u, v, memory["way_u"][0], memory["way_v"][0])):
+        memory["searched_s"], memory["opened"] = now, 0
+        find_way(memory, u, v, gu, gv)
+    return 0
+
+
+@jit_inline
+def _keep_way(see: View, memory: Row, params: Params, u: float, v: float, gu: float, gv: float) -> int:
+    return keep_way(memory, see.percept["now_s"], u, v, gu, gv, params.again_s, params.gain_m / params.cell_m)
+
+
+@jit_inline
+def _drive(see: View, memory: Row, params: Params, u: float, v: float, forgot: int) -> None:
+    """Head for the first corner, or for the free direction nearest to it."""
+    cell = params.cell_m
+    eu, ev = memory["way_u"][0] - u, memory["way_v"][0] - v
+    bearing = wrap_angle(math.atan2(ev, eu) - see.percept["compass"])
+    far = cell * math.sqrt(eu * eu + ev * ev)
+    body = see.rig.body
+    speed = arrival_speed(
+        see.percept["goal_distance"] - 0.5 * params.arrive_m, body.v_max_mps, body.a_max_mps2, see.percept["dt_s"]
+    )
+    reason, state = R_CORNER, FOLLOW
+    if memory["way_n"] == 1:
+        reason, state = R_FREE, ADVANCE
+    _watch_hold(see, memory, params, u, v)
+    if see.percept["now_s"] < memory["leave_s"]:
+        bearing = wrap_angle(memory["leave"] - see.percept["compass"])
+        reason, state = R_LEAVES, ESCAPE
+    else:
+        ahead = min(far, 1.2)
+        if corridor_length(see.masked, see.rig, bearing, see.rig.body.radius_m + params.room_m, ahead) < ahead:
+            heading, found = _nearest_free(see, bearing)
+            reason = R_BESIDE
+            if found:
+                bearing = heading
+            else:
+                bearing, reason, state = away_from_nearest(see), R_LOST, ESCAPE
+    if forgot > 0:
+        reason = R_FORGOT
+    head_for(see, bearing, speed)
+    see.out["state"], see.out["reason"], see.out["side"] = state, reason, 0
+
+
+@jit_inner
+def _nearest_free(see: View, bearing: float) -> tuple[float, bool]:
+    """Return the free direction nearest to ``bearing`` by the widest rule that leaves one, and whether there is one."""
+    sensor = see.rig.sensor
+    for rule in range(NARROW, ESCAPE_RULE + 1):
+        safe_directions(see.masked, sensor, see.reach[rule], see.edges, see.narrow)
+        best, heading = math.inf, 0.0
+        for n in range(sensor.beams):
+            if see.narrow[n]:
+                off = abs(wrap_angle(sensor.angle_min + n * sensor.increment - bearing))
+                if off < best:
+                    best, heading = off, sensor.angle_min + n * sensor.increment
+        if best < 1.6:
+            return wrap_angle(heading), True
+    return 0.0, False
+
+
+@jit_inner
+def _watch_hold(see: View, memory: Row, params: Params, u: float, v: float) -> None:
+    """Notice a robot that does not get away from where it is; let it leave where there is most room."""
+    now = see.percept["now_s"]
+    moved = 0.05 / params.cell_m
+    if memory["ticks"] == 1 or (u - memory["held_u"]) ** 2 + (v - memory["held_v"]) ** 2 > moved * moved:
+        memory["held_u"], memory["held_v"], memory["held_s"] = u, v, now
+        return
+    if now - memory["held_s"] < params.held_s or now < memory["leave_s"]:
+        return
+    best, heading = 0.0, 0.0
+    for k in range(24):
+        b = k * math.pi / 12.0
+        free = corridor_length(see.masked, see.rig, b, see.rig.footprint, 3.0)
+        if free > best:
+            best, heading = free, b
+    memory["leave"], memory["leave_s"] = see.percept["compass"] + heading, now + 1.0
+    memory["held_s"] = now
+    memory["closed"] = 1
