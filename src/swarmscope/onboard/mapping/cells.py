@@ -1,10 +1,12 @@
-"""The map: cells in which something stands, a bit each, in pages that are there only where something is.
+"""The map: where something stands, in two layers, in the frame of the robot's odometry and compass.
 
-Cells are squares of ``cell_m`` in the *odometry frame*: x east, y north as the robot's compass says, the origin where
-it started. Page (px, py) holds 64 x 64 cells; the directory wraps round after 32 pages, so that what lies that far
-away is forgotten when its place is wanted. Unknown is free.
+*Fine layer*: cells of ``cell_m``, a bit each, in a square of 256 x 256 cells that moves with the robot. Of these it is
+asked whether the robot's disc fits at a place, to a quarter of a cell.
+*Place layer*: all that the square has left behind. A bit for each node of a grid four cells wide says whether the disc
+did not fit there. It is kept in pages of 64 x 64 nodes that are there only where something is; the directory wraps
+round after 32 pages, so that what lies that far away is forgotten when its place is wanted.
 
-``rows`` are kept per robot; ``memory`` is its row of ``MAP`` (``mapping/memory.py``).
+Unknown is free. All places are in cells. ``memory`` is a robot's row of ``MAP`` (``mapping/memory.py``).
 """
 
 from __future__ import annotations
@@ -17,21 +19,61 @@ from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.onboard.mapping.words import ONE, WORD, ZERO, bit, window
 from swarmscope.onboard.percept import Row
 
+WIDE = 256
+"""Cells on a side of the fine layer."""
+WIDE_WORDS = WIDE // WORD
+NODE = 4
+"""Cells from node to node of the place layer; node (kx, ky) lies at (4 kx + 2, 4 ky + 2)."""
+NODES = WIDE // NODE
+RIM = 2
+"""Nodes along the rim of the fine layer that are still asked of the place layer: discs there reach beyond it."""
 PAGES = 255
-"""That there can be at once, 512 bytes each: at 0.125 m 130 m x 125 m."""
+"""That there can be at once, 512 bytes each."""
 DIRECTORY = 32
 NO_PAGE = 0
 PAGE_BITS = 6
 QUARTERS = 4
 """Discs are drawn for places to a quarter of a cell."""
-DISC_ROWS = 20
+DISC_ROWS = 2 * NODE * RIM + 1
 """Of cells that a disc may have at most."""
 
 
 @jit_inline
-def page_of(memory: Row, ix: int, iy: int) -> int:
-    """Return the slot of the page that cell (ix, iy) lies in, -1: there is none, all of it is free."""
-    px, py = ix >> PAGE_BITS, iy >> PAGE_BITS
+def is_near(memory: Row, ix: int, iy: int) -> bool:
+    """Tell whether a cell lies in the fine layer."""
+    return bool(0 <= ix - memory["west"] < WIDE and 0 <= iy - memory["south"] < WIDE)
+
+
+@jit_inline
+def row_of(memory: Row, ix: int, iy: int) -> np.uint64:
+    """Return the 64 cells of the fine layer's row ``iy`` that begin at ``ix``."""
+    row, word = iy & (WIDE - 1), (ix >> PAGE_BITS) & (WIDE_WORDS - 1)
+    return window(memory["fine"][row, word], memory["fine"][row, (word + 1) & (WIDE_WORDS - 1)], ix & (WORD - 1))
+
+
+@jit_inline
+def is_set(memory: Row, ix: int, iy: int) -> bool:
+    """Tell whether something stands in a cell of the fine layer."""
+    word = memory["fine"][iy & (WIDE - 1), (ix >> PAGE_BITS) & (WIDE_WORDS - 1)]
+    return bool((word >> np.uint64(ix & (WORD - 1))) & ONE)
+
+
+@jit_inline
+def set_cell(memory: Row, ix: int, iy: int) -> None:
+    """Note that something stands in a cell of the fine layer."""
+    memory["fine"][iy & (WIDE - 1), (ix >> PAGE_BITS) & (WIDE_WORDS - 1)] |= bit(ix & (WORD - 1))
+
+
+@jit_inline
+def clear_cell(memory: Row, ix: int, iy: int) -> None:
+    """Note that nothing stands in a cell of the fine layer."""
+    memory["fine"][iy & (WIDE - 1), (ix >> PAGE_BITS) & (WIDE_WORDS - 1)] &= ~bit(ix & (WORD - 1))
+
+
+@jit_inline
+def page_of(memory: Row, kx: int, ky: int) -> int:
+    """Return the slot of the page that node (kx, ky) lies in, -1: there is none, all of it is free."""
+    px, py = kx >> PAGE_BITS, ky >> PAGE_BITS
     slot = np.int64(memory["page_at"][py & (DIRECTORY - 1), px & (DIRECTORY - 1)]) - 1
     if slot >= 0 and (memory["page_x"][slot] != px or memory["page_y"][slot] != py):
         return -1
@@ -39,36 +81,27 @@ def page_of(memory: Row, ix: int, iy: int) -> int:
 
 
 @jit_inline
-def row_of(memory: Row, ix: int, iy: int) -> np.uint64:
-    """Return the 64 cells of the page of (ix, iy) that lie in its row."""
-    slot = page_of(memory, ix, iy)
-    return memory["rows"][slot, iy & (WORD - 1)] if slot >= 0 else ZERO
-
-
-@jit_inline
-def is_set(memory: Row, ix: int, iy: int) -> bool:
-    """Tell whether something stands in cell (ix, iy)."""
-    return bool((row_of(memory, ix, iy) >> np.uint64(ix & (WORD - 1))) & ONE)
+def is_blocked(memory: Row, kx: int, ky: int) -> bool:
+    """Tell whether the place layer has node (kx, ky) blocked."""
+    slot = page_of(memory, kx, ky)
+    return slot >= 0 and bool((memory["rows"][slot, ky & (WORD - 1)] >> np.uint64(kx & (WORD - 1))) & ONE)
 
 
 @jit
-def set_cell(memory: Row, ix: int, iy: int) -> None:
-    """Note that something stands in cell (ix, iy)."""
-    slot = page_of(memory, ix, iy)
+def block(memory: Row, kx: int, ky: int, blocked: bool) -> None:
+    """Write into the place layer whether node (kx, ky) is blocked."""
+    slot = page_of(memory, kx, ky)
     if slot < 0:
-        slot = _new_page(memory, ix >> PAGE_BITS, iy >> PAGE_BITS)
-    memory["rows"][slot, iy & (WORD - 1)] |= bit(ix & (WORD - 1))
+        if not blocked:
+            return
+        slot = _new_page(memory, kx >> PAGE_BITS, ky >> PAGE_BITS)
+    if blocked:
+        memory["rows"][slot, ky & (WORD - 1)] |= bit(kx & (WORD - 1))
+    else:
+        memory["rows"][slot, ky & (WORD - 1)] &= ~bit(kx & (WORD - 1))
 
 
-@jit_inline
-def clear_cell(memory: Row, ix: int, iy: int) -> None:
-    """Note that nothing stands in cell (ix, iy)."""
-    slot = page_of(memory, ix, iy)
-    if slot >= 0:
-        memory["rows"][slot, iy & (WORD - 1)] &= ~bit(ix & (WORD - 1))
-
-
-@jit
+@jit_inner
 def _new_page(memory: Row, px: int, py: int) -> int:
     """Return the slot of a new, empty page: a free one, else that of the page farthest from this one."""
     at_y, at_x = py & (DIRECTORY - 1), px & (DIRECTORY - 1)
@@ -92,17 +125,73 @@ def _new_page(memory: Row, px: int, py: int) -> int:
 
 @jit
 def forget_all(memory: Row) -> None:
-    """Forget every cell."""
+    """Forget everything."""
     for y in range(DIRECTORY):
         for x in range(DIRECTORY):
             memory["page_at"][y, x] = NO_PAGE
     memory["pages_n"] = 0
+    for y in range(WIDE):
+        for w in range(WIDE_WORDS):
+            memory["fine"][y, w] = ZERO
+
+
+@jit
+def move_fine_layer(memory: Row, ix: int, iy: int) -> None:
+    """Let the fine layer follow the robot to cell (ix, iy), node by node.
+
+    What leaves it goes to the place layer; of what comes in, a blocked node becomes one cell, which blocks the same.
+    """
+    if memory["disc_half"] > 0 and memory["settled"] == 0:
+        memory["settled"] = 1
+        memory["west"], memory["south"] = NODE * ((ix // NODE) - NODES // 2), NODE * ((iy // NODE) - NODES // 2)
+    while ix // NODE - memory["west"] // NODE > NODES // 2:
+        _shift(memory, 1, 0)
+    while ix // NODE - memory["west"] // NODE < NODES // 2 - 1:
+        _shift(memory, -1, 0)
+    while iy // NODE - memory["south"] // NODE > NODES // 2:
+        _shift(memory, 0, 1)
+    while iy // NODE - memory["south"] // NODE < NODES // 2 - 1:
+        _shift(memory, 0, -1)
+
+
+@jit
+def _shift(memory: Row, ex: int, ey: int) -> None:
+    """Move the fine layer by one node along (ex, ey), one of the four directions."""
+    out = RIM if ex + ey > 0 else NODES - 1 - RIM  # the line of nodes that leaves what is asked of the fine layer
+    x0, y0 = memory["west"] // NODE, memory["south"] // NODE
+    for k in range(RIM, NODES - RIM):
+        kx, ky = (x0 + out, y0 + k) if ex != 0 else (x0 + k, y0 + out)
+        block(memory, kx, ky, not _disc_fits(memory, float(NODE * kx + 2), float(NODE * ky + 2)))
+    first = 0 if ex + ey > 0 else NODES - 1  # the line that leaves the layer
+    for k in range(NODES):
+        kx, ky = (x0 + first, y0 + k) if ex != 0 else (x0 + k, y0 + first)
+        for iy in range(NODE * ky, NODE * ky + NODE):
+            for ix in range(NODE * kx, NODE * kx + NODE):
+                clear_cell(memory, ix, iy)
+    memory["west"] += NODE * ex
+    memory["south"] += NODE * ey
+    x0, y0 = x0 + ex, y0 + ey
+    last = NODES - 1 if ex + ey > 0 else 0  # the line that comes in
+    for k in range(NODES):
+        kx, ky = (x0 + last, y0 + k) if ex != 0 else (x0 + k, y0 + last)
+        if is_blocked(memory, kx, ky):
+            set_cell(memory, NODE * kx + 2, NODE * ky + 2)
+
+
+@jit
+def block_round(memory: Row, u: float, v: float) -> None:
+    """Block the nodes of the place layer from which something at (u, v), beyond the fine layer, is too near."""
+    r = memory["disc_r"]
+    for ky in range(int(math.ceil((v - r - 2) / NODE)), int(math.floor((v + r - 2) / NODE)) + 1):
+        for kx in range(int(math.ceil((u - r - 2) / NODE)), int(math.floor((u + r - 2) / NODE)) + 1):
+            if (NODE * kx + 2 - u) ** 2 + (NODE * ky + 2 - v) ** 2 < r * r:
+                block(memory, kx, ky, True)
 
 
 @jit
 def draw_disc(memory: Row, radius: float) -> None:
     """Draw the disc of ``radius`` [cells]: the cells whose middle it holds, for a centre in each quarter of a cell."""
-    half = min(DISC_ROWS // 2 - 1, int(math.ceil(radius)))
+    half = min(DISC_ROWS // 2, int(math.ceil(radius)))
     memory["disc_half"] = half
     for qy in range(QUARTERS):
         for qx in range(QUARTERS):
@@ -117,38 +206,38 @@ def draw_disc(memory: Row, radius: float) -> None:
 
 
 @jit_inline
-def fits(memory: Row, u: float, v: float) -> bool:
-    """Tell whether the disc fits at (u, v) [cells]: nothing stands in the cells that it holds."""
+def _disc_fits(memory: Row, u: float, v: float) -> bool:
+    """Tell whether nothing stands in the cells that the disc holds at (u, v), within the fine layer."""
     ix, iy = int(math.floor(u)), int(math.floor(v))
     half = memory["disc_half"]
     x0, y0 = ix - half, iy - half
     qx, qy = int(QUARTERS * (u - ix)), int(QUARTERS * (v - iy))
     shift = x0 & (WORD - 1)
-    if shift + 2 * half < WORD and (y0 & (WORD - 1)) + 2 * half < WORD:
-        slot = page_of(memory, x0, y0)
-        if slot < 0:
-            return True
-        first = y0 & (WORD - 1)
+    word = (x0 >> PAGE_BITS) & (WIDE_WORDS - 1)
+    if shift + 2 * half < WORD:
         for j in range(2 * half + 1):
-            if (memory["rows"][slot, first + j] >> np.uint64(shift)) & memory["disc"][qy, qx, j]:
+            if (memory["fine"][(y0 + j) & (WIDE - 1), word] >> np.uint64(shift)) & memory["disc"][qy, qx, j]:
                 return False
         return True
-    return _fits_over_borders(memory, x0, y0, qx, qy)
-
-
-@jit
-def _fits_over_borders(memory: Row, x0: int, y0: int, qx: int, qy: int) -> bool:
-    shift = x0 & (WORD - 1)
-    for j in range(2 * memory["disc_half"] + 1):
-        row = window(row_of(memory, x0, y0 + j), row_of(memory, x0 + WORD, y0 + j), shift)
-        if row & memory["disc"][qy, qx, j]:
+    for j in range(2 * half + 1):
+        if row_of(memory, x0, y0 + j) & memory["disc"][qy, qx, j]:
             return False
     return True
 
 
+@jit_inline
+def fits(memory: Row, u: float, v: float) -> bool:
+    """Tell whether the disc fits at (u, v) by the map."""
+    ex, ey = u - memory["west"], v - memory["south"]
+    rim = float(NODE * RIM)
+    if rim <= ex < WIDE - rim and rim <= ey < WIDE - rim:
+        return _disc_fits(memory, u, v)
+    return not is_blocked(memory, int(math.floor(u)) // NODE, int(math.floor(v)) // NODE)
+
+
 @jit_inner
 def _in_the_way(memory: Row, u: float, v: float) -> bool:
-    """Tell whether a robot that stands for long is in the way of a disc at (u, v) [cells]."""
+    """Tell whether a robot that stands for long is in the way of a disc at (u, v)."""
     for k in range(memory["stand_n"]):
         ex, ey = u - memory["stand_u"][k], v - memory["stand_v"][k]
         if ex * ex + ey * ey < memory["stand_r"][k] ** 2:
@@ -158,13 +247,13 @@ def _in_the_way(memory: Row, u: float, v: float) -> bool:
 
 @jit_inline
 def is_open(memory: Row, u: float, v: float) -> bool:
-    """Tell whether the robot may be at (u, v) [cells] by all that it knows."""
+    """Tell whether the robot may be at (u, v) by all that it knows."""
     return fits(memory, u, v) and not _in_the_way(memory, u, v)
 
 
 @jit
 def open_way(memory: Row, u0: float, v0: float, u1: float, v1: float) -> bool:
-    """Tell whether the straight way between two places [cells] is open; where it begins does not count."""
+    """Tell whether the straight way between two places is open; where it begins does not count."""
     du, dv = u1 - u0, v1 - v0
     steps = int(math.ceil(math.sqrt(du * du + dv * dv)))
     for k in range(1, steps + 1):

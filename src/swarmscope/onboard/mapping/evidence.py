@@ -13,16 +13,16 @@ import numpy as np
 
 from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.geometry import point_segment_distance, rough_angle
-from swarmscope.onboard.mapping.cells import clear_cell, is_set, row_of, set_cell
+from swarmscope.onboard.mapping.cells import block_round, clear_cell, is_near, is_set, move_fine_layer, row_of, set_cell
 from swarmscope.onboard.mapping.memory import NEAR
-from swarmscope.onboard.mapping.words import WORD, ZERO, bit, lowest, window, without_lowest
+from swarmscope.onboard.mapping.words import ZERO, bit, lowest, without_lowest
 from swarmscope.onboard.percept import Row
 from swarmscope.onboard.view import View
 
 HIT, PASSED, MOST = 4, 4, 15
 SURE = 12
 """Of a cell that was seen before it came near."""
-CLEARS_WITHIN_M = 2.5
+CLEARS_WITHIN_M = 2.0
 EVERY = 4
 """A cell is looked at for being passed in one tick of so many."""
 HALF_DIAGONAL = math.sqrt(0.5)
@@ -34,6 +34,7 @@ def learn(see: View, memory: Row, cell_m: float, deep_m: float) -> None:
     ``opened``."""
     shared, rig = see.shared, see.rig
     u, v = shared["x"] / cell_m, shared["y"] / cell_m
+    move_fine_layer(memory, int(math.floor(u)), int(math.floor(v)))
     _move_near(memory, int(math.floor(u)), int(math.floor(v)))
     c, s = math.cos(see.percept["compass"]) / cell_m, math.sin(see.percept["compass"]) / cell_m
     first, last = 0, rig.sensor.beams - 1
@@ -74,6 +75,9 @@ def _on_standing(memory: Row, hu: float, hv: float, own: float) -> bool:
 @jit_inline
 def _hit(memory: Row, ix: int, iy: int) -> bool:
     """Count a hit; return whether the cell is new in the map."""
+    if not is_near(memory, ix, iy):
+        block_round(memory, ix + 0.5, iy + 0.5)
+        return False
     near = abs(ix - memory["near_x"]) < NEAR // 2 and abs(iy - memory["near_y"]) < NEAR // 2
     known = is_set(memory, ix, iy)
     if near:
@@ -127,7 +131,7 @@ def _clear_passed(see: View, memory: Row, cell_m: float) -> None:
     for iy in range(memory["near_y"] - reach, memory["near_y"] + reach + 1):
         if (iy + memory["ticks"]) % EVERY != 0:
             continue
-        row = window(row_of(memory, x0, iy), row_of(memory, x0 + WORD, iy), x0 & (WORD - 1)) & mask
+        row = row_of(memory, x0, iy) & mask
         while row != ZERO:
             ix = x0 + lowest(row)
             row = without_lowest(row)

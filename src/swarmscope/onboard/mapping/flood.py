@@ -13,18 +13,19 @@ import math
 import numpy as np
 
 from swarmscope._jit import jit, jit_inline, jit_inner
-from swarmscope.onboard.mapping.cells import is_open, open_way
-from swarmscope.onboard.mapping.memory import CORNERS, SCRATCH
-from swarmscope.onboard.mapping.search import STEP
-from swarmscope.onboard.mapping.words import ONE, WORD, ZERO, bit, lowest, without_lowest
+from swarmscope.onboard.mapping.cells import NODE, NODES, PAGE_BITS, RIM, WIDE, fits, open_way
+from swarmscope.onboard.mapping.memory import CORNERS
+from swarmscope.onboard.mapping.words import ONE, WORD, ZERO, bit
 from swarmscope.onboard.percept import Row
 
 MARGIN = 4
-"""Nodes round all that is known: a way needs no more."""
+"""Nodes beyond the goal."""
+MOST_PAGES = 8
+"""On a side."""
 LABELS = 6
 BLOCKED = 7
 MOST_WAVES = 20_000
-ROWS_ON = 16
+ROWS_ON = MOST_PAGES
 """Words that say which rows the last wave has reached."""
 
 
@@ -37,48 +38,40 @@ def _wide(wave: int) -> bool:
 @jit
 def flood(memory: Row, u0: float, v0: float, u1: float, v1: float) -> bool:
     """Write a way from (u0, v0) to (u1, v1) [cells] into the memory's; return whether there is one."""
-    low_u, low_v, high_u, high_v = _bounds(memory, u0, v0, u1, v1)
-    step = STEP
-    while True:
-        width = int((high_u - low_u) / step) + 2 * MARGIN + 1
-        height = int((high_v - low_v) / step) + 2 * MARGIN + 1
-        words = (width + WORD - 1) // WORD
-        if 3 * words * height <= SCRATCH - 2 * ROWS_ON and height <= ROWS_ON * WORD:
-            break
-        step *= 2
-    ox, oy = int(math.floor(low_u / step)) - MARGIN, int(math.floor(low_v / step)) - MARGIN
-    _block(memory, ox, oy, step, words, height, width)
-    sx, sy = _open_node(memory, u0, v0, ox, oy, step, words, height)
-    gx, gy = _open_node(memory, u1, v1, ox, oy, step, words, height)
+    ox, oy, words, height = _frame(memory, u0, v0, u1, v1)
+    memory["scratch_n"] = max(memory["scratch_n"], 3 * words * height + 2 * ROWS_ON)
+    _block(memory, ox, oy, words, height)
+    sx, sy = _open_node(memory, u0, v0, ox, oy, words, height)
+    gx, gy = _open_node(memory, u1, v1, ox, oy, words, height)
     if sx < 0 or gx < 0:
         return False
-    memory["scratch_n"] = max(memory["scratch_n"], 3 * words * height + 2 * ROWS_ON)
     waves = _spread(memory, sx, sy, gx, gy, words, height)
     if waves < 0:
         return False
-    return _walk_back(memory, waves, gx, gy, ox, oy, step, words, height, u0, v0, u1, v1)
+    return _walk_back(memory, waves, gx, gy, ox, oy, words, height, u0, v0, u1, v1)
 
 
 @jit
-def _bounds(memory: Row, u0: float, v0: float, u1: float, v1: float) -> tuple[float, float, float, float]:
-    """Return the least and greatest coordinates [cells] of all that is known."""
-    low_u, low_v, high_u, high_v = min(u0, u1), min(v0, v1), max(u0, u1), max(v0, v1)
+def _frame(memory: Row, u0: float, v0: float, u1: float, v1: float) -> tuple[int, int, int, int]:
+    """Return the node at the corner of all that is known, in whole pages, how many words wide and nodes high it is.
+
+    Where that is more than the scratch holds, what is far from the robot is left out.
+    """
+    px, py = int(math.floor(u0 / NODE)) >> PAGE_BITS, int(math.floor(v0 / NODE)) >> PAGE_BITS
+    west, east, south, north = px, px, py, py
+    reach = WIDE // 2 // NODE
+    for side in range(-1, 2, 2):
+        for u, v in ((u0, v0), (u1, v1)):
+            margin = reach if u == u0 else MARGIN
+            kx = (int(math.floor(u / NODE)) + side * margin) >> PAGE_BITS
+            ky = (int(math.floor(v / NODE)) + side * margin) >> PAGE_BITS
+            west, east, south, north = min(west, kx), max(east, kx), min(south, ky), max(north, ky)
     for k in range(memory["pages_n"]):
-        some = ZERO
-        first, last = WORD, -1
-        for y in range(WORD):
-            if memory["rows"][k, y] != ZERO:
-                some |= memory["rows"][k, y]
-                first, last = min(first, y), y
-        if last >= 0:
-            at_u, at_v = float(memory["page_x"][k] * WORD), float(memory["page_y"][k] * WORD)
-            left = lowest(some)
-            right = WORD - 1
-            while not (some >> np.uint64(right)) & ONE:
-                right -= 1
-            low_u, high_u = min(low_u, at_u + left), max(high_u, at_u + right + 1)
-            low_v, high_v = min(low_v, at_v + first), max(high_v, at_v + last + 1)
-    return low_u, low_v, high_u, high_v
+        west, east = min(west, memory["page_x"][k]), max(east, memory["page_x"][k])
+        south, north = min(south, memory["page_y"][k]), max(north, memory["page_y"][k])
+    west, east = max(west, px - MOST_PAGES // 2), min(east, px + MOST_PAGES // 2 - 1)
+    south, north = max(south, py - MOST_PAGES // 2), min(north, py + MOST_PAGES // 2 - 1)
+    return west * WORD, south * WORD, east - west + 1, (north - south + 1) * WORD
 
 
 @jit_inline
@@ -87,49 +80,40 @@ def _at(plane: int, y: int, w: int, words: int, height: int) -> int:
 
 
 @jit
-def _block(memory: Row, ox: int, oy: int, step: int, words: int, height: int, width: int) -> None:
+def _block(memory: Row, ox: int, oy: int, words: int, height: int) -> None:
     """Write which nodes cannot be gone over: label 7, all others 0."""
     scratch = memory["scratch"]
     for k in range(2 * ROWS_ON + 3 * words * height):
         scratch[k] = ZERO
-    for y in range(height):
-        for x in range(width, words * WORD):
-            _close_node(memory, x, y, words, height)
     for k in range(memory["pages_n"]):
-        at_u, at_v = memory["page_x"][k] * WORD, memory["page_y"][k] * WORD
-        for y in range(WORD):
-            row = memory["rows"][k, y]
-            while row != ZERO:
-                u, v = at_u + lowest(row) + 0.5, at_v + y + 0.5
-                row = without_lowest(row)
-                _close_round(memory, u, v, memory["disc_r"], ox, oy, step, words, height)
+        w, y0 = memory["page_x"][k] - (ox >> PAGE_BITS), memory["page_y"][k] * WORD - oy
+        if 0 <= w < words and 0 <= y0 < height:
+            for y in range(WORD):
+                for plane in range(3):
+                    scratch[_at(plane, y0 + y, w, words, height)] = memory["rows"][k, y]
+    x0, y0 = memory["west"] // NODE - ox, memory["south"] // NODE - oy
+    for y in range(max(0, y0 + RIM), min(height, y0 + NODES - RIM)):
+        for x in range(max(0, x0 + RIM), min(words * WORD, x0 + NODES - RIM)):
+            open_here = fits(memory, float(NODE * (ox + x) + 2), float(NODE * (oy + y) + 2))
+            for plane in range(3):
+                at = _at(plane, y, x >> 6, words, height)
+                if open_here:
+                    scratch[at] &= ~bit(x & (WORD - 1))
+                else:
+                    scratch[at] |= bit(x & (WORD - 1))
     for k in range(memory["stand_n"]):
-        _close_round(
-            memory, memory["stand_u"][k], memory["stand_v"][k], memory["stand_r"][k], ox, oy, step, words, height
-        )
+        _close_round(memory, memory["stand_u"][k], memory["stand_v"][k], memory["stand_r"][k], ox, oy, words, height)
 
 
 @jit_inner
-def _close_round(
-    memory: Row, u: float, v: float, r: float, ox: int, oy: int, step: int, words: int, height: int
-) -> None:
+def _close_round(memory: Row, u: float, v: float, r: float, ox: int, oy: int, words: int, height: int) -> None:
     """Block the nodes within ``r`` of (u, v) [cells]."""
-    for y in range(max(0, int(math.ceil((v - r) / step)) - oy), min(height - 1, int(math.floor((v + r) / step)) - oy) + 1):
-        ev = (oy + y) * step - v
-        wide = r * r - ev * ev
-        if wide <= 0.0:
-            continue
-        wide = math.sqrt(wide)
-        first, last = int(math.ceil((u - wide) / step)) - ox, int(math.floor((u + wide) / step)) - ox
-        for x in range(max(0, first), min(words * WORD - 1, last) + 1):
-            _close_node(memory, x, y, words, height)
-
-
-@jit_inline
-def _close_node(memory: Row, x: int, y: int, words: int, height: int) -> None:
-    one = bit(x & (WORD - 1))
-    for plane in range(3):
-        memory["scratch"][_at(plane, y, x >> 6, words, height)] |= one
+    for ky in range(int(math.ceil((v - r - 2) / NODE)), int(math.floor((v + r - 2) / NODE)) + 1):
+        for kx in range(int(math.ceil((u - r - 2) / NODE)), int(math.floor((u + r - 2) / NODE)) + 1):
+            inside = 0 <= kx - ox < words * WORD and 0 <= ky - oy < height
+            if inside and (NODE * kx + 2 - u) ** 2 + (NODE * ky + 2 - v) ** 2 < r * r:
+                for plane in range(3):
+                    memory["scratch"][_at(plane, ky - oy, (kx - ox) >> 6, words, height)] |= bit((kx - ox) & (WORD - 1))
 
 
 @jit_inline
@@ -145,16 +129,16 @@ def _label(memory: Row, x: int, y: int, words: int, height: int) -> int:
 
 @jit
 def _open_node(
-    memory: Row, u: float, v: float, ox: int, oy: int, step: int, words: int, height: int
+    memory: Row, u: float, v: float, ox: int, oy: int, words: int, height: int
 ) -> tuple[int, int]:
     """Return the open node nearest to (u, v) [cells], (-1, -1) where none is near."""
-    x0, y0 = int(round(u / step)) - ox, int(round(v / step)) - oy
+    x0, y0 = int(math.floor(u / NODE)) - ox, int(math.floor(v / NODE)) - oy
     best, at_x, at_y = math.inf, -1, -1
     for y in range(y0 - 3, y0 + 4):
         for x in range(x0 - 3, x0 + 4):
             if _label(memory, x, y, words, height) != 0:
                 continue
-            d = ((ox + x) * step - u) ** 2 + ((oy + y) * step - v) ** 2
+            d = (NODE * (ox + x) + 2 - u) ** 2 + (NODE * (oy + y) + 2 - v) ** 2
             if d < best:
                 best, at_x, at_y = d, x, y
     return at_x, at_y
@@ -246,7 +230,7 @@ def _write_label(memory: Row, x: int, y: int, label: int, words: int, height: in
 
 @jit
 def _walk_back(
-    memory: Row, waves: int, gx: int, gy: int, ox: int, oy: int, step: int, words: int, height: int,
+    memory: Row, waves: int, gx: int, gy: int, ox: int, oy: int, words: int, height: int,
     u0: float, v0: float, u1: float, v1: float,
 ) -> bool:  # fmt: skip
     """Write the way that the waves have found, pulled taut; the goal comes last, later corners than fit are left out."""
@@ -255,7 +239,7 @@ def _walk_back(
     last_u, last_v = u1, v1
     x, y = gx, gy
     for k in range(waves, -1, -1):
-        u, v = float((ox + x) * step), float((oy + y) * step)
+        u, v = float(NODE * (ox + x) + 2), float(NODE * (oy + y) + 2)
         if not open_way(memory, anchor_u, anchor_v, u, v) and (last_u != anchor_u or last_v != anchor_v):
             n = _prepend(memory, n, anchor_u, anchor_v)
             anchor_u, anchor_v = last_u, last_v

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from swarmscope.onboard.mapping.cells import DIRECTORY, DISC_ROWS, PAGES, QUARTERS
+from swarmscope.onboard.mapping.cells import DIRECTORY, DISC_ROWS, PAGES, QUARTERS, WIDE, WIDE_WORDS
 from swarmscope.onboard.mapping.words import WORD
 from swarmscope.onboard.percept import NEVER_S, PEERS
 
@@ -12,11 +12,15 @@ NEAR = 64
 """Cells on a side of the square round the robot in which it is known how sure each cell is."""
 CORNERS = 64
 """Of a way, the goal included."""
-SCRATCH = 12288
+SCRATCH = 12288 + 16
 """Words for searches; places up to 64 m x 64 m take the first 3072."""
 
 MAP = np.dtype(
     [
+        ("fine", np.uint64, (WIDE, WIDE_WORDS)),
+        ("west", np.int64),  # the fine layer's first cells
+        ("south", np.int64),
+        ("settled", np.uint8),
         ("page_at", np.uint8, (DIRECTORY, DIRECTORY)),  # 1 + its slot, 0 = there is none
         ("page_x", np.int32, PAGES),
         ("page_y", np.int32, PAGES),

@@ -16,7 +16,7 @@ from swarmscope.onboard.mapping.cells import is_open, open_way
 from swarmscope.onboard.mapping.memory import CORNERS
 from swarmscope.onboard.percept import Row
 
-STEP = 1
+STEP = 2
 """Cells from node to node."""
 TABLE = 2048
 MOST_NODES = 1400

@@ -48,13 +48,13 @@ R_CORNER, R_BESIDE, R_FORGOT, R_LEAVES = range(FIRST_OWN, FIRST_OWN + 4)
 class Params(NamedTuple):
     """What can be set. Distances in m, times in s."""
 
-    cell_m: Annotated[float, Bounds(0.03, 1.0, "m")] = 0.125
+    cell_m: Annotated[float, Bounds(0.03, 1.0, "m")] = 0.0625
     """Side of a cell of the map."""
-    margin_m: Metres = 0.13
+    margin_m: Metres = 0.05
     """Kept between the body and the middle of what stands in a cell."""
     room_m: Metres = 0.021
     """Kept beside the body where the way is driven."""
-    deep_m: Metres = 0.08
+    deep_m: Metres = 0.15
     """What is hit is at least so deep."""
     arrive_m: Metres = 0.05
     """Distance to the goal at which a robot has arrived."""
