@@ -54,6 +54,7 @@ MAP = np.dtype(
         ("failed", np.uint8),  # the last search had to forget something
         ("arrived", np.uint8),
         # a robot that does not get away from where it is
+        ("comes_s", np.float64),  # when somebody last came towards it
         ("held_u", np.float64),
         ("held_v", np.float64),
         ("held_s", np.float64),
@@ -66,5 +67,5 @@ MAP = np.dtype(
 def new_memory(robots: int) -> np.ndarray:
     """Return the memory of ``robots`` robots that have seen nothing yet."""
     memory = np.zeros(robots, MAP)
-    memory["searched_s"] = memory["held_s"] = memory["leave_s"] = NEVER_S
+    memory["comes_s"] = memory["searched_s"] = memory["held_s"] = memory["leave_s"] = NEVER_S
     return memory

@@ -16,6 +16,7 @@ from swarmscope.bounds import Bounds, Metres, Seconds
 from swarmscope.geometry import wrap_angle
 from swarmscope.onboard.control.unicycle import arrival_speed
 from swarmscope.onboard.control.wanting import halt, head_for
+from swarmscope.onboard.deciding.evading import Evading, comes, evade, keep_right
 from swarmscope.onboard.deciding.following import away_from_nearest
 from swarmscope.onboard.mapping.cells import draw_disc, open_way
 from swarmscope.onboard.mapping.evidence import learn
@@ -64,6 +65,22 @@ class Params(NamedTuple):
     """Time between two searches for a shorter way, or for one where there was none."""
     gain_m: Metres = 0.3
     """A way that has opened is taken when it is shorter by so much."""
+    evade_s: Seconds = 3.0
+    """Others that move are got past when they would be met within so long; 0: never."""
+    apart_m: Metres = 0.04
+    """Kept between bodies then."""
+    evade: Annotated[float, Bounds(0.0, 100.0)] = 3.0
+    """Weight of meeting somebody at once, against a turn by a radian."""
+    slow: Annotated[float, Bounds(0.0, 100.0)] = 1.0
+    """Weight of standing."""
+    right: Annotated[float, Bounds(0.0, 100.0)] = 0.5
+    """Weight of meeting somebody who comes towards us on the right."""
+    lane_s: Seconds = 10.0
+    """For meetings so far ahead."""
+    lane_m: Metres = 1.0
+    """And who passes so near."""
+    keep_right: Metres = 5.0
+    """Who comes towards us so near makes us keep to the right where it is narrow; 0: never."""
     held_s: Seconds = 3.0
     """A robot that has not moved for so long leaves along the longest corridor."""
 
@@ -168,6 +185,13 @@ def _drive(see: View, memory: Row, params: Params, u: float, v: float, forgot: i
                 bearing, reason, state = away_from_nearest(see), R_LOST, ESCAPE
     if forgot > 0:
         reason = R_FORGOT
+    if params.keep_right > 0.0:
+        if comes(see, bearing, params.still_s, params.keep_right):
+            memory["comes_s"] = see.percept["now_s"]
+        if see.percept["now_s"] - memory["comes_s"] < 2.0:
+            bearing = keep_right(see, bearing)
+    manner = Evading(params.evade_s, params.apart_m, params.evade, params.slow, params.right, params.lane_s, params.lane_m)
+    bearing, speed = evade(see, bearing, speed, params.still_s, manner)
     head_for(see, bearing, speed)
     see.out["state"], see.out["reason"], see.out["side"] = state, reason, 0
 
