@@ -34,6 +34,8 @@ NO_PAGE = 0
 PAGE_BITS = 6
 QUARTERS = 4
 """Discs are drawn for places to a quarter of a cell."""
+BESIDE = 5
+_BESIDE_X, _BESIDE_Y = np.array([0, 1, -1, 0, 0]), np.array([0, 0, 0, 1, -1])
 DISC_ROWS = 2 * NODE * RIM + 1
 """Of cells that a disc may have at most."""
 
@@ -161,7 +163,7 @@ def _shift(memory: Row, ex: int, ey: int) -> None:
     x0, y0 = memory["west"] // NODE, memory["south"] // NODE
     for k in range(RIM, NODES - RIM):
         kx, ky = (x0 + out, y0 + k) if ex != 0 else (x0 + k, y0 + out)
-        block(memory, kx, ky, not _disc_fits(memory, float(NODE * kx + 2), float(NODE * ky + 2)))
+        block(memory, kx, ky, not _any_fits(memory, kx, ky))
     first = 0 if ex + ey > 0 else NODES - 1  # the line that leaves the layer
     for k in range(NODES):
         kx, ky = (x0 + first, y0 + k) if ex != 0 else (x0 + k, y0 + first)
@@ -176,6 +178,14 @@ def _shift(memory: Row, ex: int, ey: int) -> None:
         kx, ky = (x0 + last, y0 + k) if ex != 0 else (x0 + k, y0 + last)
         if is_blocked(memory, kx, ky):
             set_cell(memory, NODE * kx + 2, NODE * ky + 2)
+
+
+@jit_inner
+def _any_fits(memory: Row, kx: int, ky: int) -> bool:
+    for k in range(BESIDE):
+        if _disc_fits(memory, float(NODE * kx + 2 + _BESIDE_X[k]), float(NODE * ky + 2 + _BESIDE_Y[k])):
+            return True
+    return False
 
 
 @jit
@@ -226,11 +236,17 @@ def _disc_fits(memory: Row, u: float, v: float) -> bool:
 
 
 @jit_inline
-def fits(memory: Row, u: float, v: float) -> bool:
-    """Tell whether the disc fits at (u, v) by the map."""
+def is_fine(memory: Row, u: float, v: float) -> bool:
+    """Tell whether a place is one of which the fine layer is asked."""
     ex, ey = u - memory["west"], v - memory["south"]
     rim = float(NODE * RIM)
-    if rim <= ex < WIDE - rim and rim <= ey < WIDE - rim:
+    return rim <= ex < WIDE - rim and rim <= ey < WIDE - rim
+
+
+@jit_inline
+def fits(memory: Row, u: float, v: float) -> bool:
+    """Tell whether the disc fits at (u, v) by the map."""
+    if is_fine(memory, u, v):
         return _disc_fits(memory, u, v)
     return not is_blocked(memory, int(math.floor(u)) // NODE, int(math.floor(v)) // NODE)
 
@@ -249,6 +265,22 @@ def _in_the_way(memory: Row, u: float, v: float) -> bool:
 def is_open(memory: Row, u: float, v: float) -> bool:
     """Tell whether the robot may be at (u, v) by all that it knows."""
     return fits(memory, u, v) and not _in_the_way(memory, u, v)
+
+
+@jit_inline
+def node_place(memory: Row, kx: int, ky: int) -> tuple[bool, float, float]:
+    """Return whether the robot may be at node (kx, ky) or a cell beside it, and where.
+
+    A gap that is hardly wider than the robot lies between the nodes more often than not.
+    """
+    u, v = float(NODE * kx + 2), float(NODE * ky + 2)
+    if not is_fine(memory, u, v):
+        return not is_blocked(memory, kx, ky) and not _in_the_way(memory, u, v), u, v
+    for k in range(BESIDE):
+        pu, pv = u + _BESIDE_X[k], v + _BESIDE_Y[k]
+        if _disc_fits(memory, pu, pv) and not _in_the_way(memory, pu, pv):
+            return True, pu, pv
+    return False, u, v
 
 
 @jit

@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from swarmscope._jit import jit, jit_inline, jit_inner
-from swarmscope.onboard.mapping.cells import NODE, NODES, PAGE_BITS, RIM, WIDE, fits, open_way
+from swarmscope.onboard.mapping.cells import NODE, NODES, PAGE_BITS, RIM, WIDE, node_place, open_way
 from swarmscope.onboard.mapping.memory import CORNERS
 from swarmscope.onboard.mapping.words import ONE, WORD, ZERO, bit
 from swarmscope.onboard.percept import Row
@@ -94,7 +94,7 @@ def _block(memory: Row, ox: int, oy: int, words: int, height: int) -> None:
     x0, y0 = memory["west"] // NODE - ox, memory["south"] // NODE - oy
     for y in range(max(0, y0 + RIM), min(height, y0 + NODES - RIM)):
         for x in range(max(0, x0 + RIM), min(words * WORD, x0 + NODES - RIM)):
-            open_here = fits(memory, float(NODE * (ox + x) + 2), float(NODE * (oy + y) + 2))
+            open_here, _, _ = node_place(memory, ox + x, oy + y)
             for plane in range(3):
                 at = _at(plane, y, x >> 6, words, height)
                 if open_here:
@@ -158,12 +158,40 @@ def _labelled(memory: Row, y: int, w: int, label: int, words: int, height: int) 
 
 
 @jit_inline
+def _passable(memory: Row, y: int, w: int, words: int, height: int) -> np.uint64:
+    """Return which of 64 nodes are not blocked; none beyond the borders."""
+    return ~_labelled(memory, y, w, BLOCKED, words, height) if 0 <= w < words and 0 <= y < height else ZERO
+
+
+@jit_inline
+def _widened(left: np.uint64, here: np.uint64, right: np.uint64) -> np.uint64:
+    """Return 64 nodes with those beside them, given the 64 to the left and to the right."""
+    return here | (here << ONE) | (here >> ONE) | (left >> np.uint64(63)) | (right << np.uint64(63))
+
+
+@jit_inline
 def _beside(memory: Row, y: int, w: int, label: int, words: int, height: int) -> np.uint64:
     """Return which of 64 nodes carry ``label`` or lie left or right of one that does."""
-    here = _labelled(memory, y, w, label, words, height)
-    left = _labelled(memory, y, w - 1, label, words, height)
-    right = _labelled(memory, y, w + 1, label, words, height)
-    return here | (here << ONE) | (here >> ONE) | (left >> np.uint64(63)) | (right << np.uint64(63))
+    return _widened(
+        _labelled(memory, y, w - 1, label, words, height),
+        _labelled(memory, y, w, label, words, height),
+        _labelled(memory, y, w + 1, label, words, height),
+    )
+
+
+@jit_inline
+def _across(memory: Row, y: int, other: int, w: int, label: int, words: int, height: int) -> np.uint64:
+    """Return which of 64 nodes of row ``y`` lie across a corner from one of row ``other`` that carries ``label``.
+
+    One of the two nodes between must not be blocked: nobody squeezes through between two that are.
+    """
+    first = _beside(memory, other, w, label, words, height) & _passable(memory, other, w, words, height)
+    then = _widened(
+        _labelled(memory, other, w - 1, label, words, height) & _passable(memory, y, w - 1, words, height),
+        _labelled(memory, other, w, label, words, height) & _passable(memory, y, w, words, height),
+        _labelled(memory, other, w + 1, label, words, height) & _passable(memory, y, w + 1, words, height),
+    )
+    return first | then
 
 
 @jit
@@ -190,8 +218,8 @@ def _spread(memory: Row, sx: int, sy: int, gx: int, gy: int, words: int, height:
             for w in range(words):
                 reached = _beside(memory, y, w, before, words, height)
                 if wide:
-                    reached |= _beside(memory, y - 1, w, before, words, height)
-                    reached |= _beside(memory, y + 1, w, before, words, height)
+                    reached |= _across(memory, y, y - 1, w, before, words, height)
+                    reached |= _across(memory, y, y + 1, w, before, words, height)
                 else:
                     reached |= _labelled(memory, y - 1, w, before, words, height)
                     reached |= _labelled(memory, y + 1, w, before, words, height)
@@ -239,7 +267,7 @@ def _walk_back(
     last_u, last_v = u1, v1
     x, y = gx, gy
     for k in range(waves, -1, -1):
-        u, v = float(NODE * (ox + x) + 2), float(NODE * (oy + y) + 2)
+        _, u, v = node_place(memory, ox + x, oy + y)
         if not open_way(memory, anchor_u, anchor_v, u, v) and (last_u != anchor_u or last_v != anchor_v):
             n = _prepend(memory, n, anchor_u, anchor_v)
             anchor_u, anchor_v = last_u, last_v
@@ -289,6 +317,9 @@ def _before(memory: Row, x: int, y: int, wave: int, words: int, height: int) -> 
     if _wide(wave):
         for k in range(4):
             ex, ey = (1, -1, -1, 1)[k], (1, 1, -1, -1)[k]
-            if _label(memory, x + ex, y + ey, words, height) == label:
+            between = (
+                _label(memory, x + ex, y, words, height) == BLOCKED and _label(memory, x, y + ey, words, height) == BLOCKED
+            )
+            if not between and _label(memory, x + ex, y + ey, words, height) == label:
                 return x + ex, y + ey
     return -1, -1

@@ -43,6 +43,9 @@ MAP = np.dtype(
         ("way_u", np.float64, CORNERS),
         ("way_v", np.float64, CORNERS),
         ("way_n", np.int64),  # 0 = there is none
+        ("old_u", np.float64, CORNERS),  # the way before the last search
+        ("old_v", np.float64, CORNERS),
+        ("old_n", np.int64),
         ("closed", np.uint8),  # something has been seen in it
         ("opened", np.uint8),  # something is gone that was in the map
         ("searched_s", np.float64),

@@ -21,7 +21,7 @@ from swarmscope.onboard.deciding.following import away_from_nearest
 from swarmscope.onboard.mapping.cells import draw_disc, open_way
 from swarmscope.onboard.mapping.evidence import learn
 from swarmscope.onboard.mapping.memory import MAP, new_memory
-from swarmscope.onboard.mapping.way import drop_first, find_way, forget_and_find, way_length
+from swarmscope.onboard.mapping.way import drop_first, find_shorter, forget_and_find
 from swarmscope.onboard.percept import PEERS, Row
 from swarmscope.onboard.perception.corridor import corridor_length
 from swarmscope.onboard.perception.safety import safe_directions
@@ -147,7 +147,7 @@ def keep_way(memory: Row, now: float, u: float, v: float, gu: float, gv: float, 
         return forgot
     if due and (memory["opened"] or not open_way(memory, u, v, memory["way_u"][0], memory["way_v"][0])):
         memory["searched_s"], memory["opened"] = now, 0
-        find_way(memory, u, v, gu, gv)
+        find_shorter(memory, u, v, gu, gv, gain)
     return 0
 
 
