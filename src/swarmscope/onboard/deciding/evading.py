@@ -102,30 +102,37 @@ def _cost(see: View, heading: float, speed: float, still_s: float, manner: Evadi
         apart = see.rig.body.radius_m + shared["track_radius"][t] + manner.apart_m
         soonest = min(soonest, time_to_meet(x, y, ux - vx, uy - vy, apart))
         if manner.right > 0.0:
-            wrong = max(wrong, _on_the_wrong_side(x, y, ux, uy, hx, hy, speed, manner))
+            # in a frame with our course along x
+            ahead, aside = x * hx + y * hy, hx * y - hy * x
+            along, across = ux * hx + uy * hy, hx * uy - hy * ux
+            wrong = max(wrong, _on_the_wrong_side((ahead, aside), (along, across), speed, manner))
     return 1.0 - soonest / manner.ahead_s + manner.right * wrong
 
 
 @jit_inline
 def _on_the_wrong_side(
-    x: float, y: float, ux: float, uy: float, hx: float, hy: float, speed: float, manner: Evading
+    place: tuple[float, float], velocity: tuple[float, float], speed: float, manner: Evading
 ) -> float:
-    """Return how much it matters (0 to 1) that somebody who comes towards us is met on the right."""
+    """Return how much it matters (0 to 1) that somebody who comes towards us is met on the right.
+
+    ``place`` [m] and ``velocity`` [m/s] of the other, x along our course, y to its left.
+    """
+    (x, y), (ux, uy) = place, velocity
     fast = math.sqrt(ux * ux + uy * uy)
-    if fast < 0.05 or ux * hx + uy * hy > -0.7 * fast or x * hx + y * hy < 0.0:
+    if fast < SLOWEST_MPS or ux > -TOWARDS * fast or x < 0.0:
         return 0.0
-    wx, wy = ux - speed * hx, uy - speed * hy
-    w2 = wx * wx + wy * wy
-    t = -(x * wx + y * wy) / w2
+    wx = ux - speed
+    t = -(x * wx + y * uy) / (wx * wx + uy * uy)
     if t <= 0.0 or t > manner.lane_s:
         return 0.0
-    qx, qy = x + t * wx, y + t * wy
-    left = hx * qy - hy * qx
-    if left > manner.lane_m or left < -manner.lane_m:
+    left = y + t * uy
+    if abs(left) > manner.lane_m:
         return 0.0
     return (1.0 - t / manner.lane_s) * (1.0 - left / manner.lane_m) * 0.5
 
 
+SLOWEST_MPS, TOWARDS = 0.05, 0.7
+"""Who is slower, or whose course is off ours by more than an angle with this cosine, does not come towards us."""
 AGAINST = 0.95
 """Cosine of how far off one's own course somebody still comes towards one, negative."""
 NARROW_M = 2.6

@@ -16,7 +16,7 @@ import math
 import numpy as np
 
 from swarmscope._jit import jit, jit_inline, jit_inner
-from swarmscope.onboard.mapping.words import ONE, WORD, ZERO, bit, window
+from swarmscope.onboard.mapping.words import ONE, WORD, ZERO, bit, number, window
 from swarmscope.onboard.percept import Row
 
 WIDE = 256
@@ -34,6 +34,8 @@ NO_PAGE = 0
 PAGE_BITS = 6
 QUARTERS = 4
 """Discs are drawn for places to a quarter of a cell."""
+STRIDE = 2.0
+"""Cells from disc to disc along a way: what lies between two sticks out of both by a tenth of a cell."""
 BESIDE = 5
 _BESIDE_X, _BESIDE_Y = np.array([0, 1, -1, 0, 0]), np.array([0, 0, 0, 1, -1])
 DISC_ROWS = 2 * NODE * RIM + 1
@@ -76,7 +78,7 @@ def clear_cell(memory: Row, ix: int, iy: int) -> None:
 def page_of(memory: Row, kx: int, ky: int) -> int:
     """Return the slot of the page that node (kx, ky) lies in, -1: there is none, all of it is free."""
     px, py = kx >> PAGE_BITS, ky >> PAGE_BITS
-    slot = np.int64(memory["page_at"][py & (DIRECTORY - 1), px & (DIRECTORY - 1)]) - 1
+    slot = number(memory["page_at"][py & (DIRECTORY - 1), px & (DIRECTORY - 1)]) - 1
     if slot >= 0 and (memory["page_x"][slot] != px or memory["page_y"][slot] != py):
         return -1
     return slot
@@ -107,7 +109,7 @@ def block(memory: Row, kx: int, ky: int, blocked: bool) -> None:
 def _new_page(memory: Row, px: int, py: int) -> int:
     """Return the slot of a new, empty page: a free one, else that of the page farthest from this one."""
     at_y, at_x = py & (DIRECTORY - 1), px & (DIRECTORY - 1)
-    slot = np.int64(memory["page_at"][at_y, at_x]) - 1
+    slot = number(memory["page_at"][at_y, at_x]) - 1
     if slot < 0 and memory["pages_n"] < PAGES:
         slot = memory["pages_n"]
         memory["pages_n"] += 1
@@ -240,7 +242,7 @@ def is_fine(memory: Row, u: float, v: float) -> bool:
     """Tell whether a place is one of which the fine layer is asked."""
     ex, ey = u - memory["west"], v - memory["south"]
     rim = float(NODE * RIM)
-    return rim <= ex < WIDE - rim and rim <= ey < WIDE - rim
+    return bool(rim <= ex < WIDE - rim and rim <= ey < WIDE - rim)
 
 
 @jit_inline
@@ -287,8 +289,14 @@ def node_place(memory: Row, kx: int, ky: int) -> tuple[bool, float, float]:
 def open_way(memory: Row, u0: float, v0: float, u1: float, v1: float) -> bool:
     """Tell whether the straight way between two places is open; where it begins does not count."""
     du, dv = u1 - u0, v1 - v0
-    steps = int(math.ceil(math.sqrt(du * du + dv * dv)))
-    for k in range(1, steps + 1):
-        if not is_open(memory, u0 + du * k / steps, v0 + dv * k / steps):
+    length = math.sqrt(du * du + dv * dv)
+    if length <= 0.0:
+        return True
+    du, dv = du / length, dv / length
+    at = 0.0
+    while at < length:
+        step = STRIDE if is_fine(memory, u0 + at * du, v0 + at * dv) else float(NODE)
+        at = min(length, at + step)
+        if not is_open(memory, u0 + at * du, v0 + at * dv):
             return False
     return True

@@ -9,17 +9,25 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.geometry import point_segment_distance, rough_angle
-from swarmscope.onboard.mapping.cells import block_round, clear_cell, is_near, is_set, move_fine_layer, row_of, set_cell
+from swarmscope.onboard.mapping.cells import (
+    block_round,
+    clear_cell,
+    is_near,
+    is_set,
+    move_fine_layer,
+    row_of,
+    set_cell,
+)
 from swarmscope.onboard.mapping.memory import NEAR
-from swarmscope.onboard.mapping.words import ZERO, bit, lowest, without_lowest
+from swarmscope.onboard.mapping.words import ZERO, Spot, bit, lowest, number, without_lowest
 from swarmscope.onboard.percept import Row
 from swarmscope.onboard.view import View
 
 HIT, PASSED, MOST = 4, 4, 15
+MOST_AGAIN = 3
+"""As often as counts."""
 SURE = 12
 """Of a cell that was seen before it came near."""
 CLEARS_WITHIN_M = 2.0
@@ -34,6 +42,7 @@ def learn(see: View, memory: Row, cell_m: float, deep_m: float) -> None:
     ``opened``."""
     shared, rig = see.shared, see.rig
     u, v = shared["x"] / cell_m, shared["y"] / cell_m
+    here = Spot(u, v)
     move_fine_layer(memory, int(math.floor(u)), int(math.floor(v)))
     _move_near(memory, int(math.floor(u)), int(math.floor(v)))
     c, s = math.cos(see.percept["compass"]) / cell_m, math.sin(see.percept["compass"]) / cell_m
@@ -45,19 +54,15 @@ def learn(see: View, memory: Row, cell_m: float, deep_m: float) -> None:
         r = see.masked[n]
         if not (rig.sensor.range_min <= r < rig.sensor.range_max) or see.unseen[n] != 0:
             continue
-        bx, by = rig.cos[n], rig.sin[n]
-        eu, ev = c * bx - s * by, s * bx + c * by
+        eu, ev = c * rig.cos[n] - s * rig.sin[n], s * rig.cos[n] + c * rig.sin[n]
         hu, hv = u + r * eu, v + r * ev
         ix, iy = int(math.floor(hu)), int(math.floor(hv))
-        if (ix == was_x and iy == was_y) or (memory["stand_n"] > 0 and _on_standing(memory, hu, hv, rig.footprint / cell_m)):
+        if (ix == was_x and iy == was_y) or _on_standing(memory, hu, hv, rig.footprint / cell_m):
             continue
         was_x, was_y = ix, iy
-        if _hit(memory, ix, iy) and _closes(memory, u, v, ix + 0.5, iy + 0.5):
-            memory["closed"] = 1
+        _hit(memory, here, ix, iy)
         if deep_m > 0.0:
-            ix, iy = int(math.floor(hu + deep_m * eu)), int(math.floor(hv + deep_m * ev))
-            if _hit(memory, ix, iy) and _closes(memory, u, v, ix + 0.5, iy + 0.5):
-                memory["closed"] = 1
+            _hit(memory, here, int(math.floor(hu + deep_m * eu)), int(math.floor(hv + deep_m * ev)))
     _clear_passed(see, memory, cell_m)
     memory["ticks"] += 1
 
@@ -73,22 +78,21 @@ def _on_standing(memory: Row, hu: float, hv: float, own: float) -> bool:
 
 
 @jit_inline
-def _hit(memory: Row, ix: int, iy: int) -> bool:
-    """Count a hit; return whether the cell is new in the map."""
+def _hit(memory: Row, here: Spot, ix: int, iy: int) -> None:
+    """Count a hit in a cell; note it when that closes the way of a robot ``here``."""
     if not is_near(memory, ix, iy):
         block_round(memory, ix + 0.5, iy + 0.5)
-        return False
-    near = abs(ix - memory["near_x"]) < NEAR // 2 and abs(iy - memory["near_y"]) < NEAR // 2
+        return
     known = is_set(memory, ix, iy)
-    if near:
-        e = np.int64(memory["evidence"][iy & (NEAR - 1), ix & (NEAR - 1)])
+    if abs(ix - memory["near_x"]) < NEAR // 2 and abs(iy - memory["near_y"]) < NEAR // 2:
+        e = number(memory["evidence"][iy & (NEAR - 1), ix & (NEAR - 1)])
         again = e >> 4
-        sure = min(MOST, (e & 15 if known else 0) + HIT * (1 + again))
-        memory["evidence"][iy & (NEAR - 1), ix & (NEAR - 1)] = (again << 4) | sure
-    if known:
-        return False
-    set_cell(memory, ix, iy)
-    return True
+        sure = HIT * (1 + again) + (e & 15 if known else 0)
+        memory["evidence"][iy & (NEAR - 1), ix & (NEAR - 1)] = (again << 4) | (sure if sure < MOST else MOST)
+    if not known:
+        set_cell(memory, ix, iy)
+        if _closes(memory, here.u, here.v, ix + 0.5, iy + 0.5):
+            memory["closed"] = 1
 
 
 @jit_inner
@@ -170,11 +174,12 @@ def _is_passed(see: View, du: float, dv: float, cell_m: float) -> bool:
 @jit_inner
 def _pass(memory: Row, ix: int, iy: int) -> None:
     """Count that a cell was passed; it leaves the map when nothing is left of what speaks for it."""
-    e = np.int64(memory["evidence"][iy & (NEAR - 1), ix & (NEAR - 1)])
+    e = number(memory["evidence"][iy & (NEAR - 1), ix & (NEAR - 1)])
     again, sure = e >> 4, e & 15
-    sure = max(0, sure - max(1, PASSED >> again))
-    if sure == 0:
+    less = PASSED >> again
+    sure -= less if less > 1 else 1
+    if sure <= 0:
         clear_cell(memory, ix, iy)
-        again = min(3, again + 1)
+        sure, again = 0, again + 1 if again < MOST_AGAIN else again
         memory["opened"] = 1
     memory["evidence"][iy & (NEAR - 1), ix & (NEAR - 1)] = (again << 4) | sure

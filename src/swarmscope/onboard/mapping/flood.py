@@ -1,21 +1,21 @@
 """Ways where a search would take too many nodes: a flood that goes over 64 nodes at a time.
 
-From the robot a wave goes over the nodes (every second cell, wider apart where the place is larger than the scratch),
-in turns to four and to eight neighbours, which is nearly as far in all directions. Each node keeps the number of its
-wave modulo 6 in three bits: one step back from the goal is always to a neighbour of the wave before. The way back is
-pulled taut as it is walked.
+From the robot waves go over the nodes of the place layer, in turns to four and to eight neighbours, which is nearly as
+far in all directions. Each node keeps the number of its wave modulo 6 in three bits: one step back from the goal is
+always to a neighbour of the wave before. The way back is pulled taut as it is walked.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.onboard.mapping.cells import NODE, NODES, PAGE_BITS, RIM, WIDE, node_place, open_way
 from swarmscope.onboard.mapping.memory import CORNERS
-from swarmscope.onboard.mapping.words import ONE, WORD, ZERO, bit
+from swarmscope.onboard.mapping.words import ONE, WORD, ZERO, Spot, bit, number
 from swarmscope.onboard.percept import Row
 
 MARGIN = 4
@@ -29,6 +29,15 @@ ROWS_ON = MOST_PAGES
 """Words that say which rows the last wave has reached."""
 
 
+class Frame(NamedTuple):
+    """What is flooded: its first node, and how many words wide and nodes high it is."""
+
+    ox: int
+    oy: int
+    words: int
+    height: int
+
+
 @jit_inline
 def _wide(wave: int) -> bool:
     """Tell whether a wave goes to eight neighbours: 5 of 12 do, the share that makes it a regular octagon."""
@@ -37,23 +46,25 @@ def _wide(wave: int) -> bool:
 
 @jit
 def flood(memory: Row, u0: float, v0: float, u1: float, v1: float) -> bool:
-    """Write a way from (u0, v0) to (u1, v1) [cells] into the memory's; return whether there is one."""
-    ox, oy, words, height = _frame(memory, u0, v0, u1, v1)
-    memory["scratch_n"] = max(memory["scratch_n"], 3 * words * height + 2 * ROWS_ON)
-    _block(memory, ox, oy, words, height)
-    sx, sy = _open_node(memory, u0, v0, ox, oy, words, height)
-    gx, gy = _open_node(memory, u1, v1, ox, oy, words, height)
-    if sx < 0 or gx < 0:
+    """Write a way from (u0, v0) to (u1, v1) [cells] into the memory's; return whether there is one.
+
+    The memory holds no way afterwards if not.
+    """
+    memory["way_n"] = 0
+    frame = _frame(memory, u0, v0, u1, v1)
+    memory["scratch_n"] = max(memory["scratch_n"], 2 * ROWS_ON + 3 * frame.words * frame.height)
+    _block(memory, frame)
+    start = _open_node(memory, frame, u0, v0)
+    goal = _open_node(memory, frame, u1, v1)
+    if start[0] < 0 or goal[0] < 0:
         return False
-    waves = _spread(memory, sx, sy, gx, gy, words, height)
-    if waves < 0:
-        return False
-    return _walk_back(memory, waves, gx, gy, ox, oy, words, height, u0, v0, u1, v1)
+    waves = _spread(memory, frame, start, goal)
+    return waves >= 0 and _walk_back(memory, frame, waves, goal, (Spot(u0, v0), Spot(u1, v1)))
 
 
 @jit
-def _frame(memory: Row, u0: float, v0: float, u1: float, v1: float) -> tuple[int, int, int, int]:
-    """Return the node at the corner of all that is known, in whole pages, how many words wide and nodes high it is.
+def _frame(memory: Row, u0: float, v0: float, u1: float, v1: float) -> Frame:
+    """Return the frame of all that is known, in whole pages.
 
     Where that is more than the scratch holds, what is far from the robot is left out.
     """
@@ -71,96 +82,97 @@ def _frame(memory: Row, u0: float, v0: float, u1: float, v1: float) -> tuple[int
         south, north = min(south, memory["page_y"][k]), max(north, memory["page_y"][k])
     west, east = max(west, px - MOST_PAGES // 2), min(east, px + MOST_PAGES // 2 - 1)
     south, north = max(south, py - MOST_PAGES // 2), min(north, py + MOST_PAGES // 2 - 1)
-    return west * WORD, south * WORD, east - west + 1, (north - south + 1) * WORD
+    return Frame(west * WORD, south * WORD, east - west + 1, (north - south + 1) * WORD)
 
 
 @jit_inline
-def _at(plane: int, y: int, w: int, words: int, height: int) -> int:
-    return 2 * ROWS_ON + (plane * height + y) * words + w
+def _at(frame: Frame, plane: int, y: int, w: int) -> int:
+    return 2 * ROWS_ON + (plane * frame.height + y) * frame.words + w
 
 
 @jit
-def _block(memory: Row, ox: int, oy: int, words: int, height: int) -> None:
+def _block(memory: Row, frame: Frame) -> None:
     """Write which nodes cannot be gone over: label 7, all others 0."""
     scratch = memory["scratch"]
-    for k in range(2 * ROWS_ON + 3 * words * height):
+    for k in range(2 * ROWS_ON + 3 * frame.words * frame.height):
         scratch[k] = ZERO
     for k in range(memory["pages_n"]):
-        w, y0 = memory["page_x"][k] - (ox >> PAGE_BITS), memory["page_y"][k] * WORD - oy
-        if 0 <= w < words and 0 <= y0 < height:
+        w, y0 = memory["page_x"][k] - (frame.ox >> PAGE_BITS), memory["page_y"][k] * WORD - frame.oy
+        if 0 <= w < frame.words and 0 <= y0 < frame.height:
             for y in range(WORD):
                 for plane in range(3):
-                    scratch[_at(plane, y0 + y, w, words, height)] = memory["rows"][k, y]
-    x0, y0 = memory["west"] // NODE - ox, memory["south"] // NODE - oy
-    for y in range(max(0, y0 + RIM), min(height, y0 + NODES - RIM)):
-        for x in range(max(0, x0 + RIM), min(words * WORD, x0 + NODES - RIM)):
-            open_here, _, _ = node_place(memory, ox + x, oy + y)
+                    scratch[_at(frame, plane, y0 + y, w)] = memory["rows"][k, y]
+    x0, y0 = memory["west"] // NODE - frame.ox, memory["south"] // NODE - frame.oy
+    for y in range(max(0, y0 + RIM), min(frame.height, y0 + NODES - RIM)):
+        for x in range(max(0, x0 + RIM), min(frame.words * WORD, x0 + NODES - RIM)):
+            open_here, _, _ = node_place(memory, frame.ox + x, frame.oy + y)
             for plane in range(3):
-                at = _at(plane, y, x >> 6, words, height)
+                at = _at(frame, plane, y, x >> 6)
                 if open_here:
                     scratch[at] &= ~bit(x & (WORD - 1))
                 else:
                     scratch[at] |= bit(x & (WORD - 1))
     for k in range(memory["stand_n"]):
-        _close_round(memory, memory["stand_u"][k], memory["stand_v"][k], memory["stand_r"][k], ox, oy, words, height)
+        _close_round(memory, frame, memory["stand_u"][k], memory["stand_v"][k], memory["stand_r"][k])
 
 
 @jit_inner
-def _close_round(memory: Row, u: float, v: float, r: float, ox: int, oy: int, words: int, height: int) -> None:
+def _close_round(memory: Row, frame: Frame, u: float, v: float, r: float) -> None:
     """Block the nodes within ``r`` of (u, v) [cells]."""
     for ky in range(int(math.ceil((v - r - 2) / NODE)), int(math.floor((v + r - 2) / NODE)) + 1):
         for kx in range(int(math.ceil((u - r - 2) / NODE)), int(math.floor((u + r - 2) / NODE)) + 1):
-            inside = 0 <= kx - ox < words * WORD and 0 <= ky - oy < height
+            x, y = kx - frame.ox, ky - frame.oy
+            inside = 0 <= x < frame.words * WORD and 0 <= y < frame.height
             if inside and (NODE * kx + 2 - u) ** 2 + (NODE * ky + 2 - v) ** 2 < r * r:
                 for plane in range(3):
-                    memory["scratch"][_at(plane, ky - oy, (kx - ox) >> 6, words, height)] |= bit((kx - ox) & (WORD - 1))
+                    memory["scratch"][_at(frame, plane, y, x >> 6)] |= bit(x & (WORD - 1))
 
 
 @jit_inline
-def _label(memory: Row, x: int, y: int, words: int, height: int) -> int:
+def _label(memory: Row, frame: Frame, x: int, y: int) -> int:
     """Return the label of a node, 0: not reached."""
-    if x < 0 or y < 0 or x >= words * WORD or y >= height:
+    if x < 0 or y < 0 or x >= frame.words * WORD or y >= frame.height:
         return BLOCKED
     found = 0
     for plane in range(3):
-        found |= np.int64((memory["scratch"][_at(plane, y, x >> 6, words, height)] >> np.uint64(x & (WORD - 1))) & ONE) << plane
+        word = memory["scratch"][_at(frame, plane, y, x >> 6)]
+        found |= number((word >> np.uint64(x & (WORD - 1))) & ONE) << plane
     return found
 
 
 @jit
-def _open_node(
-    memory: Row, u: float, v: float, ox: int, oy: int, words: int, height: int
-) -> tuple[int, int]:
-    """Return the open node nearest to (u, v) [cells], (-1, -1) where none is near."""
-    x0, y0 = int(math.floor(u / NODE)) - ox, int(math.floor(v / NODE)) - oy
+def _open_node(memory: Row, frame: Frame, u: float, v: float) -> tuple[int, int]:
+    """Return the open node nearest to (u, v) [cells], (-1, -1): none is near; from beyond the frame, of its rim."""
+    x0 = min(frame.words * WORD - 1, max(0, int(math.floor(u / NODE)) - frame.ox))
+    y0 = min(frame.height - 1, max(0, int(math.floor(v / NODE)) - frame.oy))
     best, at_x, at_y = math.inf, -1, -1
     for y in range(y0 - 3, y0 + 4):
         for x in range(x0 - 3, x0 + 4):
-            if _label(memory, x, y, words, height) != 0:
+            if _label(memory, frame, x, y) != 0:
                 continue
-            d = (NODE * (ox + x) + 2 - u) ** 2 + (NODE * (oy + y) + 2 - v) ** 2
+            d = (NODE * (frame.ox + x) + 2 - u) ** 2 + (NODE * (frame.oy + y) + 2 - v) ** 2
             if d < best:
                 best, at_x, at_y = d, x, y
     return at_x, at_y
 
 
 @jit_inline
-def _labelled(memory: Row, y: int, w: int, label: int, words: int, height: int) -> np.uint64:
+def _labelled(memory: Row, frame: Frame, y: int, w: int, label: int) -> np.uint64:
     """Return which of 64 nodes carry ``label``; none beyond the borders."""
-    if w < 0 or w >= words or y < 0 or y >= height:
+    if w < 0 or w >= frame.words or y < 0 or y >= frame.height:
         return ZERO
     scratch = memory["scratch"]
     found = ~ZERO
     for plane in range(3):
-        word = scratch[_at(plane, y, w, words, height)]
+        word = scratch[_at(frame, plane, y, w)]
         found &= word if (label >> plane) & 1 else ~word
     return found
 
 
 @jit_inline
-def _passable(memory: Row, y: int, w: int, words: int, height: int) -> np.uint64:
+def _passable(memory: Row, frame: Frame, y: int, w: int) -> np.uint64:
     """Return which of 64 nodes are not blocked; none beyond the borders."""
-    return ~_labelled(memory, y, w, BLOCKED, words, height) if 0 <= w < words and 0 <= y < height else ZERO
+    return ~_labelled(memory, frame, y, w, BLOCKED) if 0 <= w < frame.words and 0 <= y < frame.height else ZERO
 
 
 @jit_inline
@@ -170,76 +182,79 @@ def _widened(left: np.uint64, here: np.uint64, right: np.uint64) -> np.uint64:
 
 
 @jit_inline
-def _beside(memory: Row, y: int, w: int, label: int, words: int, height: int) -> np.uint64:
+def _beside(memory: Row, frame: Frame, y: int, w: int, label: int) -> np.uint64:
     """Return which of 64 nodes carry ``label`` or lie left or right of one that does."""
     return _widened(
-        _labelled(memory, y, w - 1, label, words, height),
-        _labelled(memory, y, w, label, words, height),
-        _labelled(memory, y, w + 1, label, words, height),
+        _labelled(memory, frame, y, w - 1, label),
+        _labelled(memory, frame, y, w, label),
+        _labelled(memory, frame, y, w + 1, label),
     )
 
 
 @jit_inline
-def _across(memory: Row, y: int, other: int, w: int, label: int, words: int, height: int) -> np.uint64:
+def _across(memory: Row, frame: Frame, y: int, other: int, w: int, label: int) -> np.uint64:
     """Return which of 64 nodes of row ``y`` lie across a corner from one of row ``other`` that carries ``label``.
 
     One of the two nodes between must not be blocked: nobody squeezes through between two that are.
     """
-    first = _beside(memory, other, w, label, words, height) & _passable(memory, other, w, words, height)
+    first = _beside(memory, frame, other, w, label) & _passable(memory, frame, other, w)
     then = _widened(
-        _labelled(memory, other, w - 1, label, words, height) & _passable(memory, y, w - 1, words, height),
-        _labelled(memory, other, w, label, words, height) & _passable(memory, y, w, words, height),
-        _labelled(memory, other, w + 1, label, words, height) & _passable(memory, y, w + 1, words, height),
+        _labelled(memory, frame, other, w - 1, label) & _passable(memory, frame, y, w - 1),
+        _labelled(memory, frame, other, w, label) & _passable(memory, frame, y, w),
+        _labelled(memory, frame, other, w + 1, label) & _passable(memory, frame, y, w + 1),
     )
     return first | then
 
 
 @jit
-def _spread(memory: Row, sx: int, sy: int, gx: int, gy: int, words: int, height: int) -> int:
-    """Let waves go out from node (sx, sy); return the number of the one that reaches (gx, gy), -1: none does."""
+def _spread(memory: Row, frame: Frame, start: tuple[int, int], goal: tuple[int, int]) -> int:
+    """Let waves go out from a node; return the number of the one that reaches another, -1: none does."""
     scratch = memory["scratch"]
-    _write_label(memory, sx, sy, 1, words, height)
-    if sx == gx and sy == gy:
+    _write_label(memory, frame, start[0], start[1], 1)
+    if start == goal:
         return 0
-    scratch[sy >> 6] = bit(sy & (WORD - 1))
-    low, high = sy, sy
+    scratch[start[1] >> 6] = bit(start[1] & (WORD - 1))
+    low, high = start[1], start[1]
     for wave in range(1, MOST_WAVES):
-        before, label = (wave - 1) % LABELS + 1, wave % LABELS + 1
-        wide = _wide(wave)
         on, off = ROWS_ON * ((wave - 1) & 1), ROWS_ON * (wave & 1)
-        first, last = max(0, low - 1), min(height - 1, high + 1)
-        low, high = height, -1
+        first, last = max(0, low - 1), min(frame.height - 1, high + 1)
+        low, high = frame.height, -1
         for k in range(ROWS_ON):
             scratch[off + k] = ZERO
         for y in range(first, last + 1):
-            if not (_is_on(memory, on, y - 1) or _is_on(memory, on, y) or _is_on(memory, on, y + 1)):
-                continue
-            some = ZERO
-            for w in range(words):
-                reached = _beside(memory, y, w, before, words, height)
-                if wide:
-                    reached |= _across(memory, y, y - 1, w, before, words, height)
-                    reached |= _across(memory, y, y + 1, w, before, words, height)
-                else:
-                    reached |= _labelled(memory, y - 1, w, before, words, height)
-                    reached |= _labelled(memory, y + 1, w, before, words, height)
-                if reached == ZERO:
-                    continue
-                at = _at(0, y, w, words, height)
-                plane = words * height
-                reached &= ~(scratch[at] | scratch[at + plane] | scratch[at + 2 * plane])
-                for k in range(3):
-                    if (label >> k) & 1:
-                        scratch[at + k * plane] |= reached
-                some |= reached
-            if some != ZERO:
+            if (_is_on(memory, on, y - 1) or _is_on(memory, on, y) or _is_on(memory, on, y + 1)) and _reach_row(
+                memory, frame, y, wave
+            ):
                 low, high = min(low, y), max(high, y)
                 scratch[off + (y >> 6)] |= bit(y & (WORD - 1))
         if high < 0:
             return -1
-        if _label(memory, gx, gy, words, height) != 0:
+        if _label(memory, frame, goal[0], goal[1]) != 0:
             return wave
     return -1
+
+
+@jit_inner
+def _reach_row(memory: Row, frame: Frame, y: int, wave: int) -> bool:
+    """Let a wave go over the nodes of a row; return whether it reaches new ones."""
+    scratch, plane = memory["scratch"], frame.words * frame.height
+    before, label = (wave - 1) % LABELS + 1, wave % LABELS + 1
+    some = ZERO
+    for w in range(frame.words):
+        reached = _beside(memory, frame, y, w, before)
+        if _wide(wave):
+            reached |= _across(memory, frame, y, y - 1, w, before) | _across(memory, frame, y, y + 1, w, before)
+        else:
+            reached |= _labelled(memory, frame, y - 1, w, before) | _labelled(memory, frame, y + 1, w, before)
+        if reached == ZERO:
+            continue
+        at = _at(frame, 0, y, w)
+        reached &= ~(scratch[at] | scratch[at + plane] | scratch[at + 2 * plane])
+        for k in range(3):
+            if (label >> k) & 1:
+                scratch[at + k * plane] |= reached
+        some |= reached
+    return bool(some != ZERO)
 
 
 @jit_inline
@@ -250,52 +265,50 @@ def _is_on(memory: Row, base: int, y: int) -> bool:
 
 
 @jit_inline
-def _write_label(memory: Row, x: int, y: int, label: int, words: int, height: int) -> None:
+def _write_label(memory: Row, frame: Frame, x: int, y: int, label: int) -> None:
     for plane in range(3):
         if (label >> plane) & 1:
-            memory["scratch"][_at(plane, y, x >> 6, words, height)] |= bit(x & (WORD - 1))
+            memory["scratch"][_at(frame, plane, y, x >> 6)] |= bit(x & (WORD - 1))
 
 
 @jit
-def _walk_back(
-    memory: Row, waves: int, gx: int, gy: int, ox: int, oy: int, words: int, height: int,
-    u0: float, v0: float, u1: float, v1: float,
-) -> bool:  # fmt: skip
-    """Write the way that the waves have found, pulled taut; the goal comes last, later corners than fit are left out."""
+def _walk_back(memory: Row, frame: Frame, waves: int, node: tuple[int, int], ends: tuple[Spot, Spot]) -> bool:
+    """Write the way that the waves have found, pulled taut; the goal comes last, later corners than fit are left out.
+
+    It ends in the ``node`` that wave number ``waves`` has reached; ``ends`` are start and goal.
+    """
+    x, y = node
     n = 0
-    anchor_u, anchor_v = u1, v1
-    last_u, last_v = u1, v1
-    x, y = gx, gy
-    for k in range(waves, -1, -1):
-        _, u, v = node_place(memory, ox + x, oy + y)
-        if not open_way(memory, anchor_u, anchor_v, u, v) and (last_u != anchor_u or last_v != anchor_v):
-            n = _prepend(memory, n, anchor_u, anchor_v)
-            anchor_u, anchor_v = last_u, last_v
-        last_u, last_v = u, v
+    anchor = last = ends[1]
+    for k in range(waves, -2, -1):
+        here = ends[0]
+        if k >= 0:
+            _, u, v = node_place(memory, frame.ox + x, frame.oy + y)
+            here = Spot(u, v)
+        if last != anchor and not open_way(memory, anchor.u, anchor.v, here.u, here.v):
+            n = _prepend(memory, n, anchor)
+            anchor = last
+        last = here
         if k > 0:
-            x, y = _before(memory, x, y, k, words, height)
+            x, y = _before(memory, frame, x, y, k)
             if x < 0:
                 return False
-    if not open_way(memory, anchor_u, anchor_v, u0, v0):
-        n = _prepend(memory, n, anchor_u, anchor_v)
-        anchor_u, anchor_v = last_u, last_v
-    n = _prepend(memory, n, anchor_u, anchor_v)
+    n = _prepend(memory, n, anchor)
     for k in range(n // 2):
         _swap(memory, k, n - 1 - k)
     memory["way_n"] = n
-    if memory["way_u"][n - 1] != u1 or memory["way_v"][n - 1] != v1:
-        memory["way_u"][n - 1], memory["way_v"][n - 1] = u1, v1
+    memory["way_u"][n - 1], memory["way_v"][n - 1] = ends[1].u, ends[1].v
     return True
 
 
 @jit_inner
-def _prepend(memory: Row, n: int, u: float, v: float) -> int:
+def _prepend(memory: Row, n: int, spot: Spot) -> int:
     """Note one more corner, nearest to the goal first; those beyond the last place push out the first."""
     if n == CORNERS:
         for k in range(CORNERS - 1):
             memory["way_u"][k], memory["way_v"][k] = memory["way_u"][k + 1], memory["way_v"][k + 1]
         n -= 1
-    memory["way_u"][n], memory["way_v"][n] = u, v
+    memory["way_u"][n], memory["way_v"][n] = spot.u, spot.v
     return n + 1
 
 
@@ -307,19 +320,17 @@ def _swap(memory: Row, i: int, j: int) -> None:
 
 
 @jit_inner
-def _before(memory: Row, x: int, y: int, wave: int, words: int, height: int) -> tuple[int, int]:
+def _before(memory: Row, frame: Frame, x: int, y: int, wave: int) -> tuple[int, int]:
     """Return the neighbour from which wave ``wave`` came to node (x, y), (-1, -1): there is none."""
     label = (wave - 1) % LABELS + 1
     for k in range(4):
         ex, ey = (1, 0, -1, 0)[k], (0, 1, 0, -1)[k]
-        if _label(memory, x + ex, y + ey, words, height) == label:
+        if _label(memory, frame, x + ex, y + ey) == label:
             return x + ex, y + ey
     if _wide(wave):
         for k in range(4):
             ex, ey = (1, -1, -1, 1)[k], (1, 1, -1, -1)[k]
-            between = (
-                _label(memory, x + ex, y, words, height) == BLOCKED and _label(memory, x, y + ey, words, height) == BLOCKED
-            )
-            if not between and _label(memory, x + ex, y + ey, words, height) == label:
+            shut = _label(memory, frame, x + ex, y) == BLOCKED and _label(memory, frame, x, y + ey) == BLOCKED
+            if not shut and _label(memory, frame, x + ex, y + ey) == label:
                 return x + ex, y + ey
     return -1, -1

@@ -53,6 +53,8 @@ MAP = np.dtype(
         ("floods", np.int64),
         ("failures", np.int64),
         ("scratch", np.uint64, SCRATCH),
+        ("nodes_n", np.int64),  # of a search
+        ("queue_n", np.int64),
         ("scratch_n", np.int64),  # words of it that have been used
         ("failed", np.uint8),  # the last search had to forget something
         ("arrived", np.uint8),

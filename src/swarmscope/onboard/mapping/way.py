@@ -9,33 +9,38 @@ from swarmscope.onboard.mapping.cells import draw_disc, forget_all, is_open, ope
 from swarmscope.onboard.mapping.flood import flood
 from swarmscope.onboard.mapping.memory import CORNERS
 from swarmscope.onboard.mapping.search import FOUND, TOO_MANY, shortest
+from swarmscope.onboard.mapping.words import Spot
 from swarmscope.onboard.percept import Row
 
 HALVINGS = 4
 SWEEPS = 2
+REACHED = 0.5
+"""A corner so near [cells] is behind."""
+LESS_ROOM = 0.6
+"""By so many cells a robot asks for less room when nothing else is open."""
 GOAL_WITHIN = 8
 """A goal that is not open is gone to as near as a place so many cells from it."""
 
 
 @jit
-def find_way(memory: Row, u0: float, v0: float, u1: float, v1: float) -> bool:
-    """Search a way from (u0, v0) to (u1, v1) [cells]; return whether there is one. The old one stays if not."""
+def find_way(memory: Row, here: Spot, goal: Spot) -> bool:
+    """Search a way; return whether there is one. Where the goal is not open it leads past the nearest open place."""
     memory["searches"] += 1
-    gu, gv = _goal_place(memory, u1, v1)
-    found = shortest(memory, u0, v0, gu, gv)
+    gu, gv = _goal_place(memory, goal.u, goal.v)
+    found = shortest(memory, here.u, here.v, gu, gv)
     ok = found == FOUND
     if found == TOO_MANY:
         memory["floods"] += 1
-        ok = flood(memory, u0, v0, gu, gv)
+        ok = flood(memory, here.u, here.v, gu, gv)
     if not ok:
         memory["failures"] += 1
         return False
     memory["closed"] = 0
-    tighten(memory, u0, v0)
+    tighten(memory, here.u, here.v)
     n = memory["way_n"]
-    if gu != u1 or gv != v1:
+    if gu != goal.u or gv != goal.v:
         n = min(CORNERS, n + 1)
-        memory["way_u"][n - 1], memory["way_v"][n - 1] = u1, v1
+        memory["way_u"][n - 1], memory["way_v"][n - 1] = goal.u, goal.v
         memory["way_n"] = n
     return True
 
@@ -64,7 +69,7 @@ def tighten(memory: Row, u0: float, v0: float) -> None:
             cu, cv = memory["way_u"][k], memory["way_v"][k]
             bu, bv = memory["way_u"][k + 1], memory["way_v"][k + 1]
             if open_way(memory, au, av, bu, bv):
-                drop_first(memory, k)
+                drop_corner(memory, k)
                 continue
             # the foot of the corner on the line from a to b
             du, dv = bu - au, bv - av
@@ -85,17 +90,27 @@ def tighten(memory: Row, u0: float, v0: float) -> None:
 
 
 @jit_inline
-def drop_first(memory: Row, k: int) -> None:
-    """Drop corner ``k``."""
+def shorten(memory: Row, here: Spot) -> None:
+    """Drop the corners that are reached, and those from before which the next one is in sight."""
+    while memory["way_n"] > 1 and (
+        (memory["way_u"][0] - here.u) ** 2 + (memory["way_v"][0] - here.v) ** 2 < REACHED * REACHED
+        or open_way(memory, here.u, here.v, memory["way_u"][1], memory["way_v"][1])
+    ):
+        drop_corner(memory, 0)
+
+
+@jit_inline
+def drop_corner(memory: Row, k: int) -> None:
+    """Drop a corner of the way."""
     for i in range(k, memory["way_n"] - 1):
         memory["way_u"][i], memory["way_v"][i] = memory["way_u"][i + 1], memory["way_v"][i + 1]
     memory["way_n"] -= 1
 
 
 @jit_inline
-def way_length(memory: Row, u0: float, v0: float) -> float:
-    """Return how long the way is from (u0, v0) [cells]."""
-    length, au, av = 0.0, u0, v0
+def way_length(memory: Row, here: Spot) -> float:
+    """Return how long the way from here is [cells]."""
+    length, au, av = 0.0, here.u, here.v
     for k in range(memory["way_n"]):
         bu, bv = memory["way_u"][k], memory["way_v"][k]
         length += math.sqrt((bu - au) ** 2 + (bv - av) ** 2)
@@ -104,41 +119,40 @@ def way_length(memory: Row, u0: float, v0: float) -> float:
 
 
 @jit
-def find_shorter(memory: Row, u0: float, v0: float, u1: float, v1: float, gain: float) -> None:
+def find_shorter(memory: Row, here: Spot, goal: Spot, gain: float) -> None:
     """Search anew; keep the way that there is unless another one is shorter by ``gain`` [cells] or it is not open."""
-    old_length, n = way_length(memory, u0, v0), memory["way_n"]
+    old_length, n = way_length(memory, here), memory["way_n"]
     for k in range(n):
         memory["old_u"][k], memory["old_v"][k] = memory["way_u"][k], memory["way_v"][k]
-    still_open = open_way(memory, u0, v0, memory["way_u"][0], memory["way_v"][0])
-    if not find_way(memory, u0, v0, u1, v1):
-        return
-    if still_open and way_length(memory, u0, v0) > old_length - gain:
+    still_open = open_way(memory, here.u, here.v, memory["way_u"][0], memory["way_v"][0])
+    found = find_way(memory, here, goal)
+    if not found or (still_open and way_length(memory, here) > old_length - gain):
         memory["way_n"] = n
         for k in range(n):
             memory["way_u"][k], memory["way_v"][k] = memory["old_u"][k], memory["old_v"][k]
 
 
 @jit
-def forget_and_find(memory: Row, u0: float, v0: float, u1: float, v1: float) -> int:
-    """Find a way though the map closes everything: forget first who stands, then ask for less room, then all cells.
+def forget_and_find(memory: Row, here: Spot, goal: Spot) -> int:
+    """Find a way; where the map closes everything forget first who stands, then ask for less room, then forget all cells.
 
     Return how far that went, 0 to 3.
     """
-    if find_way(memory, u0, v0, u1, v1):
+    if find_way(memory, here, goal):
         return 0
     if memory["stand_n"] > 0:
         stood = memory["stand_n"]
         memory["stand_n"] = 0
-        ok = find_way(memory, u0, v0, u1, v1)
+        ok = find_way(memory, here, goal)
         memory["stand_n"] = stood
         if ok:
             return 1
     full = memory["disc_r"]
-    draw_disc(memory, full - 0.6)
-    ok = find_way(memory, u0, v0, u1, v1)
+    draw_disc(memory, full - LESS_ROOM)
+    ok = find_way(memory, here, goal)
     draw_disc(memory, full)
     if ok:
         return 2
     forget_all(memory)
-    find_way(memory, u0, v0, u1, v1)
+    find_way(memory, here, goal)
     return 3

@@ -1,6 +1,8 @@
-"""Sets of 64 cells in one number, a bit each: how rows of a map are kept, shifted and counted."""
+"""What maps are made of: sets of 64 cells in one number, a bit each, and places."""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
@@ -40,3 +42,16 @@ def window(first: np.uint64, second: np.uint64, shift: int) -> np.uint64:
     if shift == 0:
         return first
     return (first >> np.uint64(shift)) | (second << np.uint64(WORD - shift))
+
+
+@jit_inline
+def number(word: np.uint64) -> int:
+    """Return a word, or what is kept in few bits, as a whole number that may be reckoned with below 0."""
+    return np.int64(word)  # type: ignore[return-value]  # a plain number in kernels
+
+
+class Spot(NamedTuple):
+    """A place on the map [cells]."""
+
+    u: float
+    v: float

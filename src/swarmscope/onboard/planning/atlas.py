@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, NamedTuple
 
-from swarmscope._jit import jit, jit_inline, jit_inner
+from swarmscope._jit import jit_inline, jit_inner
 from swarmscope.bounds import Bounds, Metres, Seconds
 from swarmscope.geometry import wrap_angle
 from swarmscope.onboard.control.unicycle import arrival_speed
@@ -21,7 +21,8 @@ from swarmscope.onboard.deciding.following import away_from_nearest
 from swarmscope.onboard.mapping.cells import draw_disc, open_way
 from swarmscope.onboard.mapping.evidence import learn
 from swarmscope.onboard.mapping.memory import MAP, new_memory
-from swarmscope.onboard.mapping.way import drop_first, find_shorter, forget_and_find
+from swarmscope.onboard.mapping.way import find_shorter, forget_and_find, shorten
+from swarmscope.onboard.mapping.words import Spot
 from swarmscope.onboard.percept import PEERS, Row
 from swarmscope.onboard.perception.corridor import corridor_length
 from swarmscope.onboard.perception.safety import safe_directions
@@ -61,6 +62,8 @@ class Params(NamedTuple):
     """Distance to the goal at which a robot has arrived."""
     still_s: Seconds = 2.0
     """A neighbour that has not moved for so long is an obstacle."""
+    soon_s: Seconds = 0.15
+    """Time between two searches for a way that has closed."""
     again_s: Seconds = 1.0
     """Time between two searches for a shorter way, or for one where there was none."""
     gain_m: Metres = 0.3
@@ -104,8 +107,9 @@ def decide(see: View, memory: Row, params: Params) -> None:
     toward = percept["compass"] + percept["goal_bearing"]
     far = percept["goal_distance"] / cell
     gu, gv = u + far * math.cos(toward), v + far * math.sin(toward)
-    forgot = _keep_way(see, memory, params, u, v, gu, gv)
-    _drive(see, memory, params, u, v, forgot)
+    here = Spot(u, v)
+    forgot = _keep_way(see, memory, params, here, Spot(gu, gv))
+    _drive(see, memory, params, here, forgot)
 
 
 @jit_inner
@@ -126,41 +130,33 @@ def _note_standing(see: View, memory: Row, still_s: float, cell: float) -> None:
     memory["stand_n"] = n
 
 
-@jit
-def keep_way(memory: Row, now: float, u: float, v: float, gu: float, gv: float, again_s: float, gain: float) -> int:
+@jit_inline
+def _keep_way(see: View, memory: Row, params: Params, here: Spot, goal: Spot) -> int:
     """Search when there is no way, the way is closed, or a shorter one may have opened; return what was forgotten."""
-    n = memory["way_n"]
+    now, n, forgot = see.percept["now_s"], memory["way_n"], 0
     if n > 0:
-        memory["way_u"][n - 1], memory["way_v"][n - 1] = gu, gv
-    while memory["way_n"] > 1 and (
-        (memory["way_u"][0] - u) ** 2 + (memory["way_v"][0] - v) ** 2 < 0.25
-        or open_way(memory, u, v, memory["way_u"][1], memory["way_v"][1])
-    ):
-        drop_first(memory, 0)
-    due = now - memory["searched_s"] >= again_s
+        memory["way_u"][n - 1], memory["way_v"][n - 1] = goal.u, goal.v
+    shorten(memory, here)
+    due = now - memory["searched_s"] >= params.again_s
     if memory["way_n"] == 0 or memory["closed"]:
-        if memory["failed"] and not due:
-            return 0
+        soon = memory["way_n"] == 0 or now - memory["searched_s"] >= params.soon_s
+        if due or (soon and not memory["failed"]):
+            memory["searched_s"], memory["opened"] = now, 0
+            forgot = forget_and_find(memory, here, goal)
+            memory["failed"] = forgot > 0
+    elif due and (memory["opened"] or not open_way(memory, here.u, here.v, memory["way_u"][0], memory["way_v"][0])):
         memory["searched_s"], memory["opened"] = now, 0
-        forgot = forget_and_find(memory, u, v, gu, gv)
-        memory["failed"] = forgot > 0
-        return forgot
-    if due and (memory["opened"] or not open_way(memory, u, v, memory["way_u"][0], memory["way_v"][0])):
-        memory["searched_s"], memory["opened"] = now, 0
-        find_shorter(memory, u, v, gu, gv, gain)
-    return 0
+        find_shorter(memory, here, goal, params.gain_m / params.cell_m)
+    if memory["way_n"] == 0:
+        memory["way_n"], memory["way_u"][0], memory["way_v"][0] = 1, goal.u, goal.v
+    return forgot
 
 
 @jit_inline
-def _keep_way(see: View, memory: Row, params: Params, u: float, v: float, gu: float, gv: float) -> int:
-    return keep_way(memory, see.percept["now_s"], u, v, gu, gv, params.again_s, params.gain_m / params.cell_m)
-
-
-@jit_inline
-def _drive(see: View, memory: Row, params: Params, u: float, v: float, forgot: int) -> None:
+def _drive(see: View, memory: Row, params: Params, here: Spot, forgot: int) -> None:
     """Head for the first corner, or for the free direction nearest to it."""
     cell = params.cell_m
-    eu, ev = memory["way_u"][0] - u, memory["way_v"][0] - v
+    eu, ev = memory["way_u"][0] - here.u, memory["way_v"][0] - here.v
     bearing = wrap_angle(math.atan2(ev, eu) - see.percept["compass"])
     far = cell * math.sqrt(eu * eu + ev * ev)
     body = see.rig.body
@@ -170,7 +166,7 @@ def _drive(see: View, memory: Row, params: Params, u: float, v: float, forgot: i
     reason, state = R_CORNER, FOLLOW
     if memory["way_n"] == 1:
         reason, state = R_FREE, ADVANCE
-    _watch_hold(see, memory, params, u, v)
+    _watch_hold(see, memory, params, here)
     if see.percept["now_s"] < memory["leave_s"]:
         bearing = wrap_angle(memory["leave"] - see.percept["compass"])
         reason, state = R_LEAVES, ESCAPE
@@ -190,10 +186,18 @@ def _drive(see: View, memory: Row, params: Params, u: float, v: float, forgot: i
             memory["comes_s"] = see.percept["now_s"]
         if see.percept["now_s"] - memory["comes_s"] < 2.0:
             bearing = keep_right(see, bearing)
-    manner = Evading(params.evade_s, params.apart_m, params.evade, params.slow, params.right, params.lane_s, params.lane_m)
-    bearing, speed = evade(see, bearing, speed, params.still_s, manner)
+    if see.percept["now_s"] - memory["held_s"] < 0.9 * params.held_s:
+        bearing, speed = evade(see, bearing, speed, params.still_s, _manner(params))
     head_for(see, bearing, speed)
     see.out["state"], see.out["reason"], see.out["side"] = state, reason, 0
+
+
+@jit_inline
+def _manner(params: Params) -> Evading:
+    """Return how others that move are got past."""
+    return Evading(
+        params.evade_s, params.apart_m, params.evade, params.slow, params.right, params.lane_s, params.lane_m
+    )  # fmt: skip
 
 
 @jit_inner
@@ -214,12 +218,13 @@ def _nearest_free(see: View, bearing: float) -> tuple[float, bool]:
 
 
 @jit_inner
-def _watch_hold(see: View, memory: Row, params: Params, u: float, v: float) -> None:
+def _watch_hold(see: View, memory: Row, params: Params, here: Spot) -> None:
     """Notice a robot that does not get away from where it is; let it leave where there is most room."""
     now = see.percept["now_s"]
     moved = 0.05 / params.cell_m
-    if memory["ticks"] == 1 or (u - memory["held_u"]) ** 2 + (v - memory["held_v"]) ** 2 > moved * moved:
-        memory["held_u"], memory["held_v"], memory["held_s"] = u, v, now
+    gone2 = (here.u - memory["held_u"]) ** 2 + (here.v - memory["held_v"]) ** 2
+    if memory["ticks"] == 1 or gone2 > moved * moved:
+        memory["held_u"], memory["held_v"], memory["held_s"] = here.u, here.v, now
         return
     if now - memory["held_s"] < params.held_s or now < memory["leave_s"]:
         return
