@@ -17,13 +17,15 @@ from helpers import DT, circles_world, mirrored, one_robot, place_scenario, rig_
 from swarmscope.held import Held
 from swarmscope.onboard.percept import MAX_OUTBOX, PERCEPT
 from swarmscope.onboard.planners import load_planner, planner_names
-from swarmscope.onboard.reasons import ARRIVED, REASON_NAMES, STATE_NAMES
+from swarmscope.onboard.reasons import ARRIVED, STATE_NAMES
 from swarmscope.onboard.sharing.message import OK, decode
 from swarmscope.onboard.view import arrays_of, new_swarm
 
 PLANNERS = planner_names()
 MEMORY_LIMIT = 20_200
 """Bytes of planner memory per robot."""
+ROOM = {"atlas": 270_000}
+"""Of planners that keep a map: what is set aside for the largest; what a place takes of it is less (docs/atlas.md)."""
 LATENTS = 1_200
 """Bytes more for planners that keep what the networks of eight neighbours say."""
 TEMPORARY = tempfile.TemporaryDirectory(prefix="swarmscope-models-")
@@ -72,7 +74,7 @@ def step(robot):
     assert np.abs(d["w"]) <= body.w_max_radps + 1e-9
     assert np.isfinite(d["heading"])
     assert d["state"] < len(STATE_NAMES)
-    assert d["reason"] < len(REASON_NAMES)
+    assert d["reason"] < len(robot.planner.reasons)
     assert d["side"] in (-1, 0, 1)
     assert 0 <= d["n_out"] <= MAX_OUTBOX
     for k in range(d["n_out"]):
@@ -150,8 +152,8 @@ def test_the_number_of_robots_in_a_call_does_not_matter(name):
 @settings(max_examples=60)
 @given(seed=st.integers(0, 2**31))
 def test_the_mirrored_scene_gets_the_mirrored_command(name, seed):
-    if model_of(name) is not None:
-        pytest.skip("a network is not its own mirror image")
+    if model_of(name) is not None or name == "atlas":
+        pytest.skip("a network is not its own mirror image, nor is a grid whose robots keep to the right")
     here, there = random_scene(name, seed), random_scene(name, seed, mirror=True)
     for _ in range(4):
         v, w = command(step(here))
@@ -229,7 +231,7 @@ def test_memory_per_robot_stays_small(name):
     model = model_of(name)
     planner = {"name": name} if model is None else {"name": name, "model": str(model)}
     trace = run_scenario(place_scenario([(0.0, 0.0, 0.0)], [(1.0, 0.0)], planner=planner, limit_s=1.0))
-    assert 0 < trace.memory_bytes <= MEMORY_LIMIT + (0 if model is None else LATENTS)
+    assert 0 < trace.memory_bytes <= ROOM.get(name, MEMORY_LIMIT) + (0 if model is None else LATENTS)
 
 
 def test_the_percept_has_no_global_pose():

@@ -36,6 +36,8 @@ QUARTERS = 4
 """Discs are drawn for places to a quarter of a cell."""
 STRIDE = 2.0
 """Cells from disc to disc along a way: what lies between two sticks out of both by a tenth of a cell."""
+LEAST_RADIUS = 0.5 * NODE + 0.1
+"""Of a disc: a smaller one would fit between two nodes either side of a wall."""
 BESIDE = 5
 _BESIDE_X, _BESIDE_Y = np.array([0, 1, -1, 0, 0]), np.array([0, 0, 0, 1, -1])
 DISC_ROWS = 2 * NODE * RIM + 1
@@ -182,9 +184,15 @@ def _shift(memory: Row, ex: int, ey: int) -> None:
             set_cell(memory, NODE * kx + 2, NODE * ky + 2)
 
 
+@jit_inline
+def _beside(memory: Row) -> int:
+    """Return how many places there are to be at a node. Of two nodes either side of a wall one stays blocked."""
+    return BESIDE if memory["disc_r"] >= 0.5 * NODE + 1.0 else 1
+
+
 @jit_inner
 def _any_fits(memory: Row, kx: int, ky: int) -> bool:
-    for k in range(BESIDE):
+    for k in range(_beside(memory)):
         if _disc_fits(memory, float(NODE * kx + 2 + _BESIDE_X[k]), float(NODE * ky + 2 + _BESIDE_Y[k])):
             return True
     return False
@@ -228,13 +236,14 @@ def _disc_fits(memory: Row, u: float, v: float) -> bool:
     word = (x0 >> PAGE_BITS) & (WIDE_WORDS - 1)
     if shift + 2 * half < WORD:
         for j in range(2 * half + 1):
-            if (memory["fine"][(y0 + j) & (WIDE - 1), word] >> np.uint64(shift)) & memory["disc"][qy, qx, j]:
+            row = memory["fine"][(y0 + j) & (WIDE - 1), word] >> np.uint64(shift)
+            if row & np.uint64(memory["disc"][qy, qx, j]):
                 return False
         return True
+    taken = ZERO
     for j in range(2 * half + 1):
-        if row_of(memory, x0, y0 + j) & memory["disc"][qy, qx, j]:
-            return False
-    return True
+        taken |= row_of(memory, x0, y0 + j) & np.uint64(memory["disc"][qy, qx, j])
+    return bool(taken == ZERO)
 
 
 @jit_inline
@@ -278,7 +287,7 @@ def node_place(memory: Row, kx: int, ky: int) -> tuple[bool, float, float]:
     u, v = float(NODE * kx + 2), float(NODE * ky + 2)
     if not is_fine(memory, u, v):
         return not is_blocked(memory, kx, ky) and not _in_the_way(memory, u, v), u, v
-    for k in range(BESIDE):
+    for k in range(_beside(memory)):
         pu, pv = u + _BESIDE_X[k], v + _BESIDE_Y[k]
         if _disc_fits(memory, pu, pv) and not _in_the_way(memory, pu, pv):
             return True, pu, pv

@@ -285,7 +285,7 @@ def _walk_back(memory: Row, frame: Frame, waves: int, node: tuple[int, int], end
         if k >= 0:
             _, u, v = node_place(memory, frame.ox + x, frame.oy + y)
             here = Spot(u, v)
-        if last != anchor and not open_way(memory, anchor.u, anchor.v, here.u, here.v):
+        if last != anchor and not open_way(memory, here.u, here.v, anchor.u, anchor.v):
             n = _prepend(memory, n, anchor)
             anchor = last
         last = here

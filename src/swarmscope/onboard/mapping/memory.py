@@ -6,7 +6,7 @@ import numpy as np
 
 from swarmscope.onboard.mapping.cells import DIRECTORY, DISC_ROWS, PAGES, QUARTERS, WIDE, WIDE_WORDS
 from swarmscope.onboard.mapping.words import WORD
-from swarmscope.onboard.percept import NEVER_S, PEERS
+from swarmscope.onboard.percept import NEVER_S, PEERS, Row
 
 NEAR = 64
 """Cells on a side of the square round the robot in which it is known how sure each cell is."""
@@ -26,7 +26,7 @@ MAP = np.dtype(
         ("page_y", np.int32, PAGES),
         ("pages_n", np.int64),
         ("rows", np.uint64, (PAGES, WORD)),
-        ("disc", np.uint64, (QUARTERS, QUARTERS, DISC_ROWS)),  # what must be free round a robot
+        ("disc", np.uint32, (QUARTERS, QUARTERS, DISC_ROWS)),  # what must be free round a robot
         ("disc_half", np.int64),  # rows that it has on either side of its middle, 0 = not yet drawn
         ("disc_r", np.float64),  # its radius [cells]
         # how sure: 0 to 15, and in the upper four bits how often the cell has come back
@@ -74,3 +74,12 @@ def new_memory(robots: int) -> np.ndarray:
     memory = np.zeros(robots, MAP)
     memory["comes_s"] = memory["searched_s"] = memory["held_s"] = memory["leave_s"] = NEVER_S
     return memory
+
+
+def used_bytes(memory: Row) -> int:
+    """Return how much of its memory a robot has used: pages and scratch as far as they were wanted, all else whole."""
+    sizes = {name: MAP[name].itemsize for name in MAP.names or ()}
+    of_pages = sizes["rows"] // PAGES + sizes["page_x"] // PAGES + sizes["page_y"] // PAGES
+    of_scratch = sizes["scratch"] // SCRATCH
+    whole = sum(size for name, size in sizes.items() if name not in ("rows", "page_x", "page_y", "scratch"))
+    return int(whole + of_pages * memory["pages_n"] + of_scratch * memory["scratch_n"])

@@ -80,7 +80,7 @@ def tighten(memory: Row, u0: float, v0: float) -> None:
             for _ in range(HALVINGS):
                 s = 0.5 * (low + high)
                 mu, mv = cu + s * (fu - cu), cv + s * (fv - cv)
-                if open_way(memory, au, av, mu, mv) and open_way(memory, bu, bv, mu, mv) and is_open(memory, mu, mv):
+                if open_way(memory, au, av, mu, mv) and open_way(memory, mu, mv, bu, bv):
                     low = s
                 else:
                     high = s
@@ -134,7 +134,7 @@ def find_shorter(memory: Row, here: Spot, goal: Spot, gain: float) -> None:
 
 @jit
 def forget_and_find(memory: Row, here: Spot, goal: Spot) -> int:
-    """Find a way; where the map closes everything forget first who stands, then ask for less room, then forget all cells.
+    """Find a way; where the map closes everything, forget first who stands, then ask for less room, then forget all.
 
     Return how far that went, 0 to 3.
     """

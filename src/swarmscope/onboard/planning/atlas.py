@@ -18,7 +18,7 @@ from swarmscope.onboard.control.unicycle import arrival_speed
 from swarmscope.onboard.control.wanting import halt, head_for
 from swarmscope.onboard.deciding.evading import Evading, comes, evade, keep_right
 from swarmscope.onboard.deciding.following import away_from_nearest
-from swarmscope.onboard.mapping.cells import draw_disc, open_way
+from swarmscope.onboard.mapping.cells import LEAST_RADIUS, draw_disc, open_way
 from swarmscope.onboard.mapping.evidence import learn
 from swarmscope.onboard.mapping.memory import MAP, new_memory
 from swarmscope.onboard.mapping.way import find_shorter, forget_and_find, shorten
@@ -94,7 +94,7 @@ def decide(see: View, memory: Row, params: Params) -> None:
     cell = params.cell_m
     percept, shared = see.percept, see.shared
     if memory["disc_half"] == 0:
-        memory["disc_r"] = (see.rig.body.radius_m + params.margin_m) / cell
+        memory["disc_r"] = max(LEAST_RADIUS, (see.rig.body.radius_m + params.margin_m) / cell)
         draw_disc(memory, memory["disc_r"])
     if memory["arrived"] or percept["goal_distance"] <= params.arrive_m:
         memory["arrived"] = 1

@@ -1,0 +1,146 @@
+"""The two layers of the map: what the disc fits beside, and what is kept when the robot goes away and comes back."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from drawn_maps import RADIUS, map_of
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swarmscope.onboard.mapping.cells import (
+    NODE,
+    PAGES,
+    WIDE,
+    block,
+    block_round,
+    clear_cell,
+    draw_disc,
+    fits,
+    forget_all,
+    is_blocked,
+    is_near,
+    is_open,
+    is_set,
+    move_fine_layer,
+    node_place,
+    open_way,
+    set_cell,
+)
+
+CELLS = st.integers(-100, 100)
+PLACES = st.floats(-110.0, 110.0)
+
+
+@given(st.sets(st.tuples(CELLS, CELLS), max_size=30), PLACES, PLACES, st.floats(1.0, 7.5))
+def test_a_disc_fits_where_no_cells_middle_is_nearer_than_its_radius(cells, u, v, radius):
+    memory = map_of(*cells, radius=radius)
+    nearest = min((math.hypot(x + 0.5 - u, y + 0.5 - v) for x, y in cells), default=math.inf)
+    if abs(nearest - radius) > 0.18:  # places count to a quarter of a cell
+        assert fits(memory, u, v) == (nearest > radius)
+
+
+@given(st.sets(st.tuples(CELLS, CELLS), min_size=1, max_size=30))
+def test_cells_are_set_and_cleared_one_by_one(cells):
+    memory = map_of(*cells)
+    for cell in cells:
+        assert is_set(memory, *cell)
+        clear_cell(memory, *cell)
+        assert not is_set(memory, *cell)
+    assert not memory["fine"].any()
+
+
+@pytest.mark.parametrize(("ex", "ey"), [(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, 1)])
+def test_a_wall_is_still_there_when_the_robot_comes_back(ex, ey):
+    wall = [(x, 20) for x in range(-60, 61)]
+    memory = map_of(*wall)
+    for k in range(1, 600):
+        move_fine_layer(memory, k * ex, k * ey)
+    assert not is_near(memory, 0, 20)
+    assert all(not node_place(memory, kx, 4)[0] or not node_place(memory, kx, 5)[0] for kx in range(-15, 15))
+    assert fits(memory, 0.5, 40.0)
+    for k in range(600, -1, -1):
+        move_fine_layer(memory, k * ex, k * ey)
+    assert is_near(memory, 0, 20)
+    assert not open_way(memory, 0.0, 0.0, 0.0, 40.0)
+    assert open_way(memory, 0.0, 0.0, 0.0, 12.0)
+
+
+def test_what_has_gone_for_good_does_not_come_back():
+    memory = map_of(*((x, 20) for x in range(-60, 61)))
+    for k in range(300):
+        move_fine_layer(memory, 0, -k)
+    for k in range(300, -1, -1):
+        move_fine_layer(memory, 0, -k)
+    for ix in range(-70, 70):
+        for iy in range(10, 30):
+            clear_cell(memory, ix, iy)
+    for k in range(300):
+        move_fine_layer(memory, 0, -k)
+    assert all(fits(memory, 0.5, float(v)) for v in range(10, 30))
+
+
+@given(st.floats(-2000.0, 2000.0), st.floats(-2000.0, 2000.0))
+def test_a_far_hit_blocks_the_nodes_round_it(u, v):
+    memory = map_of()
+    block_round(memory, u, v)
+    kx, ky = math.floor(u / NODE), math.floor(v / NODE)
+    for x in range(kx - 2, kx + 3):
+        for y in range(ky - 2, ky + 3):
+            near = math.hypot(NODE * x + 2 - u, NODE * y + 2 - v) < RADIUS
+            assert is_blocked(memory, x, y) == near
+
+
+def test_the_farthest_page_makes_room_for_a_new_one():
+    memory = map_of()
+    nodes = [(64 * (k % 20), 64 * (k // 20)) for k in range(PAGES + 30)]
+    for kx, ky in nodes:
+        block(memory, kx, ky, True)
+    assert memory["pages_n"] == PAGES
+    assert is_blocked(memory, *nodes[-1])
+    assert sum(is_blocked(memory, *node) for node in nodes) == PAGES
+
+
+def test_what_lies_a_directory_away_takes_the_same_place():
+    memory = map_of()
+    block(memory, 5, 5, True)
+    block(memory, 5 + 32 * 64, 5, True)
+    assert is_blocked(memory, 5 + 32 * 64, 5)
+    assert not is_blocked(memory, 5, 5)
+
+
+def test_who_stands_is_in_the_way_but_not_in_the_map():
+    memory = map_of()
+    memory["stand_n"], memory["stand_u"][0], memory["stand_r"][0] = 1, 20.0, 5.0
+    assert fits(memory, 20.0, 0.0)
+    assert not is_open(memory, 20.0, 0.0)
+    assert not open_way(memory, 0.0, 0.0, 40.0, 0.0)
+    assert open_way(memory, 0.0, 6.0, 40.0, 6.0)
+
+
+def test_a_gap_that_is_hardly_wider_than_the_robot_lies_beside_a_node():
+    gap = [(x, y) for x in range(-40, 41) for y in (2, 3) if not 0 <= x <= 5]
+    memory = map_of(*gap, radius=3.0)
+    ok, u, _ = node_place(memory, 0, 0)
+    assert ok
+    assert u == 3.0
+    assert not fits(memory, 2.0, 2.0)
+
+
+def test_all_is_forgotten():
+    memory = map_of((3, 3))
+    block(memory, 500, 500, True)
+    forget_all(memory)
+    assert fits(memory, 3.5, 3.5)
+    assert not is_blocked(memory, 500, 500)
+
+
+def test_the_disc_of_the_largest_robot_fits_into_its_rows():
+    memory = map_of()
+    draw_disc(memory, 50.0)
+    set_cell(memory, 0, 0)
+    assert not fits(memory, 3.0, 3.0)
+    assert WIDE == 256
+    assert np.all(memory["disc"][..., -1] >= 0)

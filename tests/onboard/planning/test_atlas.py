@@ -1,0 +1,94 @@
+"""Atlas in whole runs: where a robot has to remember what it has seen, it does."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from helpers import circle, one_robot, place_scenario, rig_of, run_scenario, tick, wall
+from swarmscope.onboard.planning.atlas import R_FORGOT
+
+ATLAS = {"planner": {"name": "atlas"}}
+LIMIT = {"limit_s": 240.0}
+
+
+def drive(starts, goals, obstacles=(), **more):
+    trace = run_scenario(place_scenario(starts, goals, obstacles, **(ATLAS | more)))
+    assert not trace.robots["crashed"].any()
+    return trace
+
+
+def test_nothing_in_the_way_is_a_straight_line():
+    robot = drive([(-4, 0, 0)], [(4, 1)]).robots[0]
+    assert robot["length"] == pytest.approx(math.hypot(8, 1), rel=2e-3)
+
+
+def test_a_dead_end_is_left_once_and_for_all():
+    """A pocket of 7 m depth: deeper than the LiDAR sees."""
+    pocket = wall((-3, -1.2), (4, -1.2), (4, 1.2), (-3, 1.2))
+    robot = drive([(-6, 0, 0)], [(6, 0)], [pocket]).robots[0]
+    assert robot["arrived"]
+    assert robot["length"] < 26.0  # in, out, round: 6 + 7 + 11
+
+
+def test_rooms_that_lead_nowhere_are_not_entered_twice():
+    rooms = [
+        wall((-8, 8), (8, 8), (8, -8), (-8, -8), (-8, 8)),
+        wall((-2, -8), (-2, -0.6)), wall((-2, 0.6), (-2, 6.5)),  # a door into a pocket, and one at the top
+        wall((4, -8), (4, 6.5)),  # its far wall, open at the top
+        wall((-2, 4), (2, 4), (2, -4), (-2, -4)),
+    ]  # fmt: skip
+    robot = drive([(-5, 0, 0)], [(6, 0)], rooms, **LIMIT).robots[0]
+    assert robot["arrived"]
+    assert robot["length"] < 45.0
+
+
+def test_a_robot_that_is_walled_in_says_that_it_forgets_why():
+    bot = one_robot(rig_of(), "atlas")
+    bot.scan[:] = 1.0
+    bot.fill(goal_distance=10.0)
+    said = [int(tick(bot)["reason"]) for _ in range(3)]
+    assert R_FORGOT in said
+    assert abs(bot.decision["v"]) <= 0.5
+
+
+def test_two_meet_head_on():
+    trace = drive([(-3, 0.05, 0), (3, -0.05, math.pi)], [(3, 0.05), (-3, -0.05)])
+    assert trace.robots["arrived"].all()
+    assert (trace.robots["length"] < 6.6).all()
+
+
+def test_somebody_parked_in_the_way_is_gone_round():
+    trace = drive([(-3, 0, 0), (0, 0, 0)], [(3, 0), (0, 0)], [circle(0, 2, 0.2)])
+    assert trace.robots["arrived"].all()
+    assert trace.robots[0]["length"] < 6.4
+
+
+def test_the_same_run_by_one_thread_and_by_many():
+    scenario = {"task": {"name": "T3"}, "robots": 8, "seed": 1003, "limit_s": 60.0, "record_scans": "no"} | ATLAS
+    one, many = run_scenario(scenario, 1), run_scenario(scenario, 4)
+    assert one.robots.tobytes() == many.robots.tobytes()
+
+
+def test_a_robot_keeps_its_map_from_tick_to_tick():
+    rig = rig_of()
+    bot = one_robot(rig, "atlas")
+    bot.scan[:] = 2.0
+    bot.scan[:90] = np.inf
+    bot.fill(goal_distance=10.0)
+    tick(bot)
+    cells = np.bitwise_count(bot.memory["fine"]).sum()
+    assert cells > 100
+    bot.scan[:] = np.inf
+    tick(bot)
+    assert np.bitwise_count(bot.memory["fine"]).sum() > 0.9 * cells
+
+
+@pytest.mark.parametrize("cell_m", [0.03, 0.25, 1.0])
+def test_every_cell_size_that_can_be_set_drives(cell_m):
+    trace = drive(
+        [(-3, 0, 0)], [(3, 0)], [circle(0, 0.1, 0.4)], planner={"name": "atlas", "params": {"cell_m": cell_m}}
+    )
+    assert trace.robots["arrived"].all()
