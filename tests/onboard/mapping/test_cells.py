@@ -144,3 +144,15 @@ def test_the_disc_of_the_largest_robot_fits_into_its_rows():
     assert not fits(memory, 3.0, 3.0)
     assert WIDE == 256
     assert np.all(memory["disc"][..., -1] >= 0)
+
+
+@pytest.mark.parametrize("slope", [-1, 1])
+def test_a_wall_of_nodes_that_touch_at_their_corners_does_not_leak(slope):
+    memory = map_of()
+    for k in range(300):
+        block(memory, 100 + k, 100 + slope * k, True)
+    side = -slope * 120.0
+    for k in range(20, 280):
+        u, v = NODE * (100.0 + k), NODE * (100.0 + slope * k)
+        assert not open_way(memory, u - 60.0, v - side, u + 60.0, v + side)
+        assert open_way(memory, u - 60.0, v - side, u - 30.0, v - 0.5 * side)

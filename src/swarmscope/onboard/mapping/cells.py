@@ -259,7 +259,15 @@ def fits(memory: Row, u: float, v: float) -> bool:
     """Tell whether the disc fits at (u, v) by the map."""
     if is_fine(memory, u, v):
         return _disc_fits(memory, u, v)
-    return not is_blocked(memory, int(math.floor(u)) // NODE, int(math.floor(v)) // NODE)
+    west, east = int(math.floor(u - 1.0)) // NODE, int(math.floor(u + 1.0)) // NODE
+    south, north = int(math.floor(v - 1.0)) // NODE, int(math.floor(v + 1.0)) // NODE
+    # none leaks through between two nodes that touch at a corner
+    return not (
+        is_blocked(memory, west, south)
+        or is_blocked(memory, east, north)
+        or is_blocked(memory, west, north)
+        or is_blocked(memory, east, south)
+    )
 
 
 @jit_inner
@@ -304,8 +312,7 @@ def open_way(memory: Row, u0: float, v0: float, u1: float, v1: float) -> bool:
     du, dv = du / length, dv / length
     at = 0.0
     while at < length:
-        step = STRIDE if is_fine(memory, u0 + at * du, v0 + at * dv) else float(NODE)
-        at = min(length, at + step)
+        at = min(length, at + STRIDE)
         if not is_open(memory, u0 + at * du, v0 + at * dv):
             return False
     return True

@@ -20,7 +20,7 @@ from swarmscope.onboard.mapping.cells import (
     row_of,
     set_cell,
 )
-from swarmscope.onboard.mapping.memory import NEAR
+from swarmscope.onboard.mapping.memory import GONE, NEAR
 from swarmscope.onboard.mapping.words import ZERO, Spot, bit, lowest, number, without_lowest
 from swarmscope.onboard.percept import Row
 from swarmscope.onboard.view import View
@@ -31,6 +31,8 @@ MOST_AGAIN = 3
 SURE = 12
 """Of a cell that was seen before it came near."""
 CLEARS_WITHIN_M = 2.0
+MOST_RETURNS, RETURNS_S = 2, 120.0
+"""A cell that was cleared so often within so long stays when it comes back."""
 EVERY = 4
 """A cell is looked at for being passed in one tick of so many."""
 HALF_DIAGONAL = math.sqrt(0.5)
@@ -140,7 +142,7 @@ def _clear_passed(see: View, memory: Row, cell_m: float) -> None:
             ix = x0 + lowest(row)
             row = without_lowest(row)
             if _is_passed(see, ix + 0.5 - u, iy + 0.5 - v, cell_m):
-                _pass(memory, ix, iy)
+                _pass(memory, ix, iy, see.percept["now_s"])
 
 
 @jit_inline
@@ -172,14 +174,42 @@ def _is_passed(see: View, du: float, dv: float, cell_m: float) -> bool:
 
 
 @jit_inner
-def _pass(memory: Row, ix: int, iy: int) -> None:
-    """Count that a cell was passed; it leaves the map when nothing is left of what speaks for it."""
+def _pass(memory: Row, ix: int, iy: int, now: float) -> None:
+    """Count that a cell was passed; it leaves the map when nothing is left of what speaks for it.
+
+    One that has come back again and again stays: nobody is to go to and fro for it.
+    """
     e = number(memory["evidence"][iy & (NEAR - 1), ix & (NEAR - 1)])
     again, sure = e >> 4, e & 15
     less = PASSED >> again
     sure -= less if less > 1 else 1
     if sure <= 0:
-        clear_cell(memory, ix, iy)
         sure, again = 0, again + 1 if again < MOST_AGAIN else again
-        memory["opened"] = 1
+        k = _gone(memory, ix, iy)
+        if k >= 0 and memory["gone_n"][k] >= MOST_RETURNS and now - memory["gone_s"][k] < RETURNS_S:
+            sure = MOST
+        else:
+            clear_cell(memory, ix, iy)
+            _note_gone(memory, (ix, iy), k, now)
+            memory["opened"] = 1
     memory["evidence"][iy & (NEAR - 1), ix & (NEAR - 1)] = (again << 4) | sure
+
+
+@jit_inner
+def _gone(memory: Row, ix: int, iy: int) -> int:
+    """Return where it is noted that a cell has been cleared before, -1: nowhere."""
+    for k in range(GONE):
+        if memory["gone_x"][k] == ix and memory["gone_y"][k] == iy and memory["gone_n"][k] > 0:
+            return k
+    return -1
+
+
+@jit_inner
+def _note_gone(memory: Row, cell: tuple[int, int], k: int, now: float) -> None:
+    """Note that a cell has been cleared, again if ``k`` says where that is noted."""
+    if k < 0:
+        k = memory["gone_at"] % GONE
+        memory["gone_at"] += 1
+        memory["gone_x"][k], memory["gone_y"][k], memory["gone_n"][k] = cell[0], cell[1], 0
+    memory["gone_n"][k] = min(MOST_RETURNS, memory["gone_n"][k] + 1)
+    memory["gone_s"][k] = now

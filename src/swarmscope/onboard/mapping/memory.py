@@ -10,6 +10,8 @@ from swarmscope.onboard.percept import NEVER_S, PEERS, Row
 
 NEAR = 64
 """Cells on a side of the square round the robot in which it is known how sure each cell is."""
+GONE = 64
+"""Cells that are known to have been cleared."""
 CORNERS = 64
 """Of a way, the goal included."""
 SCRATCH = 12288 + 16
@@ -31,6 +33,12 @@ MAP = np.dtype(
         ("disc_r", np.float64),  # its radius [cells]
         # how sure: 0 to 15, and in the upper four bits how often the cell has come back
         ("evidence", np.uint8, (NEAR, NEAR)),
+        # cells that have been cleared, the newest over the oldest: where, how often, when last
+        ("gone_x", np.int32, GONE),
+        ("gone_y", np.int32, GONE),
+        ("gone_n", np.uint8, GONE),
+        ("gone_s", np.float64, GONE),
+        ("gone_at", np.int64),
         ("near_x", np.int64),  # the robot's cell when the square was last moved
         ("near_y", np.int64),
         ("ticks", np.int64),
@@ -43,9 +51,10 @@ MAP = np.dtype(
         ("way_u", np.float64, CORNERS),
         ("way_v", np.float64, CORNERS),
         ("way_n", np.int64),  # 0 = there is none
-        ("old_u", np.float64, CORNERS),  # the way before the last search
-        ("old_v", np.float64, CORNERS),
-        ("old_n", np.int64),
+        ("old_u", np.float32, CORNERS),  # the way before the last search
+        ("old_v", np.float32, CORNERS),
+        ("other_u", np.float32, CORNERS),  # the way that another search has found
+        ("other_v", np.float32, CORNERS),
         ("closed", np.uint8),  # something has been seen in it
         ("opened", np.uint8),  # something is gone that was in the map
         ("searched_s", np.float64),
@@ -72,6 +81,7 @@ MAP = np.dtype(
 def new_memory(robots: int) -> np.ndarray:
     """Return the memory of ``robots`` robots that have seen nothing yet."""
     memory = np.zeros(robots, MAP)
+    memory["gone_s"] = NEVER_S
     memory["comes_s"] = memory["searched_s"] = memory["held_s"] = memory["leave_s"] = NEVER_S
     return memory
 

@@ -18,6 +18,8 @@ REACHED = 0.5
 """A corner so near [cells] is behind."""
 LESS_ROOM = 0.6
 """By so many cells a robot asks for less room when nothing else is open."""
+LONG = 1.15
+"""Times the straight line: a way that is longer is compared with what a flood finds."""
 GOAL_WITHIN = 8
 """A goal that is not open is gone to as near as a place so many cells from it."""
 
@@ -27,21 +29,48 @@ def find_way(memory: Row, here: Spot, goal: Spot) -> bool:
     """Search a way; return whether there is one. Where the goal is not open it leads past the nearest open place."""
     memory["searches"] += 1
     gu, gv = _goal_place(memory, goal.u, goal.v)
-    found = shortest(memory, here.u, here.v, gu, gv)
-    ok = found == FOUND
-    if found == TOO_MANY:
-        memory["floods"] += 1
-        ok = flood(memory, here.u, here.v, gu, gv)
-    if not ok:
+    if not _search(memory, here, Spot(gu, gv)):
         memory["failures"] += 1
         return False
     memory["closed"] = 0
-    tighten(memory, here.u, here.v)
     n = memory["way_n"]
     if gu != goal.u or gv != goal.v:
         n = min(CORNERS, n + 1)
         memory["way_u"][n - 1], memory["way_v"][n - 1] = goal.u, goal.v
         memory["way_n"] = n
+    return True
+
+
+@jit_inner
+def _search(memory: Row, here: Spot, goal: Spot) -> bool:
+    """Search, and flood where that takes too many nodes or the way is long: what is found must not depend on which.
+
+    A search finds ways between the nodes of the place layer, a flood those over nodes between which no straight way is
+    open; a robot to which now the one and now the other is known goes to and fro.
+    """
+    found = shortest(memory, here.u, here.v, goal.u, goal.v)
+    straight = math.sqrt((goal.u - here.u) ** 2 + (goal.v - here.v) ** 2)
+    if found == FOUND:
+        tighten(memory, here.u, here.v)
+        length = way_length(memory, here)
+        if length <= LONG * straight:
+            return True
+        n = memory["way_n"]
+        for k in range(n):
+            memory["other_u"][k], memory["other_v"][k] = memory["way_u"][k], memory["way_v"][k]
+        memory["floods"] += 1
+        if flood(memory, here.u, here.v, goal.u, goal.v):
+            tighten(memory, here.u, here.v)
+            if way_length(memory, here) < length:
+                return True
+        memory["way_n"] = n
+        for k in range(n):
+            memory["way_u"][k], memory["way_v"][k] = memory["other_u"][k], memory["other_v"][k]
+        return True
+    memory["floods"] += 1
+    if not flood(memory, here.u, here.v, goal.u, goal.v):
+        return False
+    tighten(memory, here.u, here.v)
     return True
 
 
@@ -120,16 +149,41 @@ def way_length(memory: Row, here: Spot) -> float:
 
 @jit
 def find_shorter(memory: Row, here: Spot, goal: Spot, gain: float) -> None:
-    """Search anew; keep the way that there is unless another one is shorter by ``gain`` [cells] or it is not open."""
+    """Search anew; keep the way that there is unless another one is shorter by ``gain`` [cells].
+
+    Where its first corner is out of sight it is led on to from here: the two ways are compared as both would be gone,
+    else a robot between two that are about as long would turn round for ever.
+    """
+    _join(memory, here)
     old_length, n = way_length(memory, here), memory["way_n"]
     for k in range(n):
         memory["old_u"][k], memory["old_v"][k] = memory["way_u"][k], memory["way_v"][k]
-    still_open = open_way(memory, here.u, here.v, memory["way_u"][0], memory["way_v"][0])
     found = find_way(memory, here, goal)
-    if not found or (still_open and way_length(memory, here) > old_length - gain):
+    if not found or way_length(memory, here) > old_length - gain:
         memory["way_n"] = n
         for k in range(n):
             memory["way_u"][k], memory["way_v"][k] = memory["old_u"][k], memory["old_v"][k]
+
+
+@jit
+def _join(memory: Row, here: Spot) -> None:
+    """Lead on to the way's first corner where that is not in sight, if there is a way to it."""
+    n = memory["way_n"]
+    first = Spot(memory["way_u"][0], memory["way_v"][0])
+    if open_way(memory, here.u, here.v, first.u, first.v):
+        return
+    for k in range(n):
+        memory["old_u"][k], memory["old_v"][k] = memory["way_u"][k], memory["way_v"][k]
+    found = shortest(memory, here.u, here.v, first.u, first.v)
+    if found == TOO_MANY and flood(memory, here.u, here.v, first.u, first.v):
+        found = FOUND
+    before = memory["way_n"] - 1 if found == FOUND else 0
+    memory["way_n"] = min(CORNERS, before + n)
+    for k in range(before, memory["way_n"]):
+        memory["way_u"][k], memory["way_v"][k] = memory["old_u"][k - before], memory["old_v"][k - before]
+    memory["way_u"][memory["way_n"] - 1] = memory["old_u"][n - 1]
+    memory["way_v"][memory["way_n"] - 1] = memory["old_v"][n - 1]
+    tighten(memory, here.u, here.v)
 
 
 @jit
