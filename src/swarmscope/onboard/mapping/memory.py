@@ -10,7 +10,7 @@ from swarmscope.onboard.percept import NEVER_S, PEERS, Row
 
 NEAR = 64
 """Cells on a side of the square round the robot in which it is known how sure each cell is."""
-GONE = 64
+GONE = 32
 """Cells that are known to have been cleared."""
 CORNERS = 64
 """Of a way, the goal included."""
@@ -24,8 +24,8 @@ MAP = np.dtype(
         ("south", np.int64),
         ("settled", np.uint8),
         ("page_at", np.uint8, (DIRECTORY, DIRECTORY)),  # 1 + its slot, 0 = there is none
-        ("page_x", np.int32, PAGES),
-        ("page_y", np.int32, PAGES),
+        ("page_x", np.int16, PAGES),
+        ("page_y", np.int16, PAGES),
         ("pages_n", np.int64),
         ("rows", np.uint64, (PAGES, WORD)),
         ("disc", np.uint32, (QUARTERS, QUARTERS, DISC_ROWS)),  # what must be free round a robot
@@ -37,16 +37,16 @@ MAP = np.dtype(
         ("gone_x", np.int32, GONE),
         ("gone_y", np.int32, GONE),
         ("gone_n", np.uint8, GONE),
-        ("gone_s", np.float64, GONE),
+        ("gone_s", np.float32, GONE),
         ("gone_at", np.int64),
         ("near_x", np.int64),  # the robot's cell when the square was last moved
         ("near_y", np.int64),
         ("ticks", np.int64),
         # robots that stand for long: not in the map, but in the way
         ("stand_n", np.int64),
-        ("stand_u", np.float64, PEERS),  # [cells]
-        ("stand_v", np.float64, PEERS),
-        ("stand_r", np.float64, PEERS),  # how far the robot's middle keeps away [cells]
+        ("stand_u", np.float32, PEERS),  # [cells]
+        ("stand_v", np.float32, PEERS),
+        ("stand_r", np.float32, PEERS),  # how far the robot's middle keeps away [cells]
         # the way: corners still ahead, the goal last [cells]
         ("way_u", np.float64, CORNERS),
         ("way_v", np.float64, CORNERS),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from swarmscope._jit import jit, jit_inline, jit_inner
-from swarmscope.onboard.mapping.cells import draw_disc, forget_all, is_open, open_way
+from swarmscope.onboard.mapping.cells import LEAST_RADIUS, draw_disc, forget_all, is_open, open_way
 from swarmscope.onboard.mapping.flood import flood
 from swarmscope.onboard.mapping.memory import CORNERS
 from swarmscope.onboard.mapping.search import FOUND, TOO_MANY, shortest
@@ -202,8 +202,10 @@ def forget_and_find(memory: Row, here: Spot, goal: Spot) -> int:
         if ok:
             return 1
     full = memory["disc_r"]
-    draw_disc(memory, full - LESS_ROOM)
+    memory["disc_r"] = max(LEAST_RADIUS, full - LESS_ROOM)
+    draw_disc(memory, memory["disc_r"])
     ok = find_way(memory, here, goal)
+    memory["disc_r"] = full
     draw_disc(memory, full)
     if ok:
         return 2
