@@ -92,3 +92,30 @@ def test_every_cell_size_that_can_be_set_drives(cell_m):
         [(-3, 0, 0)], [(3, 0)], [circle(0, 0.1, 0.4)], planner={"name": "atlas", "params": {"cell_m": cell_m}}
     )
     assert trace.robots["arrived"].all()
+
+
+@pytest.mark.parametrize("goal", [math.nan, math.inf, 1e300])
+def test_a_goal_that_is_no_place_stops_nobody_for_good(goal):
+    bot = one_robot(rig_of(), "atlas")
+    bot.scan[:] = np.inf
+    bot.fill(goal_distance=goal)
+    said = tick(bot)
+    assert math.isfinite(said["v"])
+    bot.fill(goal_distance=5.0)
+    for _ in range(10):
+        said = tick(bot)
+    assert said["v"] > 0.3
+
+
+@pytest.mark.parametrize("leap", [1e3, 1e6, 1e12])
+def test_odometry_that_leaps_costs_the_map_and_no_time(leap):
+    bot = one_robot(rig_of(), "atlas")
+    bot.scan[:] = 2.0
+    bot.scan[150:210] = np.inf
+    bot.fill(goal_distance=9.0)
+    tick(bot)
+    bot.fill(odom_x=leap)
+    tick(bot)
+    bot.fill(odom_x=0.0)
+    assert tick(bot)["v"] > 0.0
+    assert np.bitwise_count(bot.memory["fine"]).sum() > 20

@@ -25,6 +25,8 @@ WIDE_WORDS = WIDE // WORD
 NODE = 4
 """Cells from node to node of the place layer; node (kx, ky) lies at (4 kx + 2, 4 ky + 2)."""
 NODES = WIDE // NODE
+LEAP = 4 * WIDE
+"""Who is suddenly so many cells from where it was begins a new fine layer: its odometry has failed."""
 RIM = 2
 """Nodes along the rim of the fine layer that are still asked of the place layer: discs there reach beyond it."""
 PAGES = 255
@@ -147,9 +149,13 @@ def move_fine_layer(memory: Row, ix: int, iy: int) -> None:
 
     What leaves it goes to the place layer; of what comes in, a blocked node becomes one cell, which blocks the same.
     """
-    if memory["disc_half"] > 0 and memory["settled"] == 0:
+    away = max(abs(ix - memory["west"] - WIDE // 2), abs(iy - memory["south"] - WIDE // 2))
+    if memory["settled"] == 0 or away > LEAP:
         memory["settled"] = 1
         memory["west"], memory["south"] = NODE * ((ix // NODE) - NODES // 2), NODE * ((iy // NODE) - NODES // 2)
+        for y in range(WIDE):
+            for w in range(WIDE_WORDS):
+                memory["fine"][y, w] = ZERO
     while ix // NODE - memory["west"] // NODE > NODES // 2:
         _shift(memory, 1, 0)
     while ix // NODE - memory["west"] // NODE < NODES // 2 - 1:

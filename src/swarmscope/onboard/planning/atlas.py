@@ -26,7 +26,7 @@ from swarmscope.onboard.mapping.words import Spot
 from swarmscope.onboard.percept import PEERS, Row
 from swarmscope.onboard.perception.corridor import corridor_length
 from swarmscope.onboard.perception.safety import safe_directions
-from swarmscope.onboard.reasons import ADVANCE, ARRIVED, ESCAPE, FIRST_OWN, FOLLOW, R_ARRIVED, R_FREE, R_LOST
+from swarmscope.onboard.reasons import ADVANCE, ARRIVED, ESCAPE, FIRST_OWN, FOLLOW, R_ARRIVED, R_FREE, R_HELD_NO_NUMBER, R_LOST
 from swarmscope.onboard.rig import ESCAPE as ESCAPE_RULE
 from swarmscope.onboard.rig import NARROW
 from swarmscope.onboard.sharing.tracks import moves
@@ -38,6 +38,8 @@ NAME = "atlas"
 SUMMARY = "Atlas: remembers what it has seen closed and goes the shortest way through the rest"
 NEEDS = "own scan, goal bearing and distance, relative poses of visible neighbours, odometry and compass"
 MEMORY = MAP
+FARTHEST_M = 500.0
+"""A goal that is farther is gone to as if it were so far."""
 REASONS = (
     "goes to the next corner of its way",
     "heads beside the next corner: something is between",
@@ -101,14 +103,17 @@ def decide(see: View, memory: Row, params: Params) -> None:
         halt(see)
         see.out["state"], see.out["reason"], see.out["side"] = ARRIVED, R_ARRIVED, 0
         return
-    _note_standing(see, memory, params.still_s, cell)
-    learn(see, memory, cell, params.deep_m)
     u, v = shared["x"] / cell, shared["y"] / cell
     toward = percept["compass"] + percept["goal_bearing"]
-    far = percept["goal_distance"] / cell
-    gu, gv = u + far * math.cos(toward), v + far * math.sin(toward)
-    here = Spot(u, v)
-    forgot = _keep_way(see, memory, params, here, Spot(gu, gv))
+    far = min(percept["goal_distance"], FARTHEST_M) / cell
+    here, goal = Spot(u, v), Spot(u + far * math.cos(toward), v + far * math.sin(toward))
+    if not abs(u) + abs(v) + abs(goal.u) + abs(goal.v) < math.inf:
+        halt(see)
+        see.out["state"], see.out["reason"], see.out["side"] = FOLLOW, R_HELD_NO_NUMBER, 0
+        return
+    _note_standing(see, memory, params.still_s, cell)
+    learn(see, memory, cell, params.deep_m)
+    forgot = _keep_way(see, memory, params, here, goal)
     _drive(see, memory, params, here, forgot)
 
 
