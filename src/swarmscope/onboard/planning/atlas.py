@@ -26,7 +26,17 @@ from swarmscope.onboard.mapping.words import Spot
 from swarmscope.onboard.percept import PEERS, Row
 from swarmscope.onboard.perception.corridor import corridor_length
 from swarmscope.onboard.perception.safety import safe_directions
-from swarmscope.onboard.reasons import ADVANCE, ARRIVED, ESCAPE, FIRST_OWN, FOLLOW, R_ARRIVED, R_FREE, R_HELD_NO_NUMBER, R_LOST
+from swarmscope.onboard.reasons import (
+    ADVANCE,
+    ARRIVED,
+    ESCAPE,
+    FIRST_OWN,
+    FOLLOW,
+    R_ARRIVED,
+    R_FREE,
+    R_HELD_NO_NUMBER,
+    R_LOST,
+)
 from swarmscope.onboard.rig import ESCAPE as ESCAPE_RULE
 from swarmscope.onboard.rig import NARROW
 from swarmscope.onboard.sharing.tracks import moves
