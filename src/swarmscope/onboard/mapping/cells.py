@@ -138,6 +138,11 @@ def forget_all(memory: Row) -> None:
         for x in range(DIRECTORY):
             memory["page_at"][y, x] = NO_PAGE
     memory["pages_n"] = 0
+    _empty_fine_layer(memory)
+
+
+@jit_inner
+def _empty_fine_layer(memory: Row) -> None:
     for y in range(WIDE):
         for w in range(WIDE_WORDS):
             memory["fine"][y, w] = ZERO
@@ -153,9 +158,7 @@ def move_fine_layer(memory: Row, ix: int, iy: int) -> None:
     if memory["settled"] == 0 or away > LEAP:
         memory["settled"] = 1
         memory["west"], memory["south"] = NODE * ((ix // NODE) - NODES // 2), NODE * ((iy // NODE) - NODES // 2)
-        for y in range(WIDE):
-            for w in range(WIDE_WORDS):
-                memory["fine"][y, w] = ZERO
+        _empty_fine_layer(memory)
     while ix // NODE - memory["west"] // NODE > NODES // 2:
         _shift(memory, 1, 0)
     while ix // NODE - memory["west"] // NODE < NODES // 2 - 1:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.onboard.mapping.cells import LEAST_RADIUS, draw_disc, forget_all, is_open, open_way
 from swarmscope.onboard.mapping.flood import flood
@@ -56,22 +58,27 @@ def _search(memory: Row, here: Spot, goal: Spot) -> bool:
         if length <= LONG * straight:
             return True
         n = memory["way_n"]
-        for k in range(n):
-            memory["other_u"][k], memory["other_v"][k] = memory["way_u"][k], memory["way_v"][k]
+        _copy(memory["way_u"], memory["way_v"], memory["other_u"], memory["other_v"], n)
         memory["floods"] += 1
         if flood(memory, here.u, here.v, goal.u, goal.v):
             tighten(memory, here.u, here.v)
             if way_length(memory, here) < length:
                 return True
         memory["way_n"] = n
-        for k in range(n):
-            memory["way_u"][k], memory["way_v"][k] = memory["other_u"][k], memory["other_v"][k]
+        _copy(memory["other_u"], memory["other_v"], memory["way_u"], memory["way_v"], n)
         return True
     memory["floods"] += 1
     if not flood(memory, here.u, here.v, goal.u, goal.v):
         return False
     tighten(memory, here.u, here.v)
     return True
+
+
+@jit_inline
+def _copy(from_u: np.ndarray, from_v: np.ndarray, to_u: np.ndarray, to_v: np.ndarray, n: int) -> None:
+    """Copy the first ``n`` corners of a way."""
+    for k in range(n):
+        to_u[k], to_v[k] = from_u[k], from_v[k]
 
 
 @jit_inner
@@ -156,13 +163,11 @@ def find_shorter(memory: Row, here: Spot, goal: Spot, gain: float) -> None:
     """
     _join(memory, here)
     old_length, n = way_length(memory, here), memory["way_n"]
-    for k in range(n):
-        memory["old_u"][k], memory["old_v"][k] = memory["way_u"][k], memory["way_v"][k]
+    _copy(memory["way_u"], memory["way_v"], memory["old_u"], memory["old_v"], n)
     found = find_way(memory, here, goal)
     if not found or way_length(memory, here) > old_length - gain:
         memory["way_n"] = n
-        for k in range(n):
-            memory["way_u"][k], memory["way_v"][k] = memory["old_u"][k], memory["old_v"][k]
+        _copy(memory["old_u"], memory["old_v"], memory["way_u"], memory["way_v"], n)
 
 
 @jit
@@ -172,8 +177,7 @@ def _join(memory: Row, here: Spot) -> None:
     first = Spot(memory["way_u"][0], memory["way_v"][0])
     if open_way(memory, here.u, here.v, first.u, first.v):
         return
-    for k in range(n):
-        memory["old_u"][k], memory["old_v"][k] = memory["way_u"][k], memory["way_v"][k]
+    _copy(memory["way_u"], memory["way_v"], memory["old_u"], memory["old_v"], n)
     found = shortest(memory, here.u, here.v, first.u, first.v)
     if found == TOO_MANY and flood(memory, here.u, here.v, first.u, first.v):
         found = FOUND

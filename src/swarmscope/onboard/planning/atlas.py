@@ -14,10 +14,10 @@ from typing import Annotated, NamedTuple
 from swarmscope._jit import jit_inline, jit_inner
 from swarmscope.bounds import Bounds, Metres, Seconds
 from swarmscope.geometry import wrap_angle
-from swarmscope.onboard.control.unicycle import arrival_speed
 from swarmscope.onboard.control.wanting import halt, head_for
 from swarmscope.onboard.deciding.evading import Evading, comes, evade, keep_right
 from swarmscope.onboard.deciding.following import away_from_nearest
+from swarmscope.onboard.deciding.progress import last_speed
 from swarmscope.onboard.mapping.cells import LEAST_RADIUS, draw_disc, open_way
 from swarmscope.onboard.mapping.evidence import learn
 from swarmscope.onboard.mapping.memory import MAP, new_memory
@@ -174,10 +174,7 @@ def _drive(see: View, memory: Row, params: Params, here: Spot, forgot: int) -> N
     eu, ev = memory["way_u"][0] - here.u, memory["way_v"][0] - here.v
     bearing = wrap_angle(math.atan2(ev, eu) - see.percept["compass"])
     far = cell * math.sqrt(eu * eu + ev * ev)
-    body = see.rig.body
-    speed = arrival_speed(
-        see.percept["goal_distance"] - 0.5 * params.arrive_m, body.v_max_mps, body.a_max_mps2, see.percept["dt_s"]
-    )
+    speed = last_speed(see, params.arrive_m)
     reason, state = R_CORNER, FOLLOW
     if memory["way_n"] == 1:
         reason, state = R_FREE, ADVANCE
