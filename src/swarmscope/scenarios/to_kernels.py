@@ -211,6 +211,14 @@ def make_setting(scenario: Scenario, setup: Setup, threads: int = 1) -> Setting:
         goal_yaws=setup.goal_yaws,
         moving=moving,
         rigs=rigs if isinstance(scenario.robot, list) else (),
-        start_s=tuple(sheet.start_s for sheet in scenario.robot) if isinstance(scenario.robot, list) else (),
+        start_s=_start_s(scenario, setup),
         record_scans=scenario.record_scans == "yes" or (scenario.record_scans == "auto" and not heavy),
     )
+
+
+def _start_s(scenario: Scenario, setup: Setup) -> tuple[float, ...]:
+    """Return when each robot is switched on [s], the later of what its data sheet and the task say."""
+    given = [sheet.start_s for sheet in scenario.robot] if isinstance(scenario.robot, list) else []
+    if setup.start_s is None:
+        return tuple(given)
+    return tuple(np.maximum(setup.start_s, given or [0.0]).tolist())

@@ -41,6 +41,7 @@ class Setup:
     starts: NDArray[np.float64]  # (N, 3) x [m], y [m], yaw [rad]
     goals: NDArray[np.float64]  # (N, 2) x, y [m]
     goal_yaws: NDArray[np.float64] | None = None  # (N,) headings wanted there [rad], NaN where any will do
+    start_s: NDArray[np.float64] | None = None  # (N,) when each robot is switched on [s]; None: at once
 
 
 class Task(Protocol):
