@@ -33,6 +33,8 @@ SURE = 12
 CLEARS_WITHIN_M = 2.0
 MOST_RETURNS, RETURNS_S = 2, 120.0
 """A cell that was cleared so often within so long stays when it comes back."""
+HIDDEN_M = 0.1
+"""What is behind a hit is hidden when beams so far beside it do not get there either."""
 EVERY = 4
 """A cell is looked at for being passed in one tick of so many."""
 HALF_DIAGONAL = math.sqrt(0.5)
@@ -63,10 +65,38 @@ def learn(see: View, memory: Row, cell_m: float, deep_m: float) -> None:
             continue
         was_x, was_y = ix, iy
         _hit(memory, here, ix, iy)
-        if deep_m > 0.0:
+        if deep_m > 0.0 and _is_hidden(see, n, r + deep_m):
             _hit(memory, here, int(math.floor(hu + deep_m * eu)), int(math.floor(hv + deep_m * ev)))
     _clear_passed(see, memory, cell_m)
     memory["ticks"] += 1
+
+
+@jit_inline
+def _is_hidden(see: View, n: int, r: float) -> bool:
+    """Tell whether the place ``r`` away [m] along beam n lies behind what the beams on both sides of it hit, too.
+
+    Else it may be beside the thing: behind a corner, or where the beam only grazes a wall.
+    """
+    aside = max(1, int(HIDDEN_M / (r * see.rig.sensor.increment)))
+    return _ends_before(see, n - aside, r) and _ends_before(see, n + aside, r)
+
+
+@jit_inline
+def _ends_before(see: View, n: int, r: float) -> bool:
+    """Tell whether something is hit before ``r`` [m] along beam n, which may lie beyond the first or the last."""
+    n, there = _wrapped(see, n)
+    return there and see.unseen[n] == 0 and bool(see.masked[n] < r)
+
+
+@jit_inline
+def _wrapped(see: View, n: int) -> tuple[int, bool]:
+    """Return the beam that is meant by a number before the first or after the last, and whether there is one."""
+    sensor = see.rig.sensor
+    if sensor.wraps and n < 0:
+        n += sensor.beams
+    elif sensor.wraps and n >= sensor.beams:
+        n -= sensor.beams
+    return n, 0 <= n < sensor.beams
 
 
 @jit_inner
@@ -161,12 +191,8 @@ def _is_passed(see: View, du: float, dv: float, cell_m: float) -> bool:
     middle = (rough_angle(x, y + 1e-12) - sensor.angle_min) / sensor.increment
     wide = math.asin(min(1.0, half / max(d, half))) / sensor.increment
     for k in range(int(math.floor(middle - wide)), int(math.ceil(middle + wide)) + 1):
-        n = k
-        if sensor.wraps and n < 0:
-            n += sensor.beams
-        elif sensor.wraps and n >= sensor.beams:
-            n -= sensor.beams
-        if n < 0 or n >= sensor.beams or see.unseen[n] != 0 or not see.scan[n] >= behind:
+        n, there = _wrapped(see, k)
+        if not there or see.unseen[n] != 0 or not see.scan[n] >= behind:
             return False
         if sensor.field > 0 and not see.shared["view_first"] <= n <= see.shared["view_last"]:
             return False
