@@ -3,7 +3,7 @@
 *Fine layer*: cells of ``cell_m``, a bit each, in a square of 256 x 256 cells that moves with the robot. Of these it is
 asked whether the robot's disc fits at a place, to a quarter of a cell.
 *Place layer*: all that the square has left behind. A bit for each node of a grid four cells wide says whether the disc
-did not fit there. It is kept in pages of 64 x 64 nodes that are there only where something is; the directory wraps
+did not fit there, a second one whether a disc with less room did. It is kept in pages of 64 x 64 nodes that are there only where something is; the directory wraps
 round after 32 pages, so that what lies that far away is forgotten when its place is wanted.
 
 Unknown is free. All places are in cells. ``memory`` is a robot's row of ``MAP`` (``mapping/memory.py``).
@@ -29,8 +29,8 @@ LEAP = 4 * WIDE
 """Who is suddenly so many cells from where it was begins a new fine layer: its odometry has failed."""
 RIM = 2
 """Nodes along the rim of the fine layer that are still asked of the place layer: discs there reach beyond it."""
-PAGES = 255
-"""That there can be at once, 512 bytes each."""
+PAGES = 127
+"""That there can be at once, a kilobyte each."""
 DIRECTORY = 32
 NO_PAGE = 0
 PAGE_BITS = 6
@@ -40,6 +40,10 @@ STRIDE = 2.0
 """Cells from disc to disc along a way: what lies between two sticks out of both by a tenth of a cell."""
 LEAST_RADIUS = 0.5 * NODE + 0.1
 """Of a disc: a smaller one would fit between two nodes either side of a wall."""
+LESS_ROOM = 0.6
+"""By so many cells a robot asks for less room where nothing else is open."""
+FULL, LESS = 0, 1
+"""How much room is asked for: the robot's own disc, or a smaller one."""
 BESIDE = 5
 _BESIDE_X, _BESIDE_Y = np.array([0, 1, -1, 0, 0]), np.array([0, 0, 0, 1, -1])
 DISC_ROWS = 2 * NODE * RIM + 1
@@ -95,18 +99,30 @@ def is_blocked(memory: Row, kx: int, ky: int) -> bool:
     return slot >= 0 and bool((memory["rows"][slot, ky & (WORD - 1)] >> np.uint64(kx & (WORD - 1))) & ONE)
 
 
+@jit_inline
+def is_slim(memory: Row, kx: int, ky: int) -> bool:
+    """Tell whether a disc with less room did fit at node (kx, ky) when the fine layer last left it."""
+    slot = page_of(memory, kx, ky)
+    return slot >= 0 and bool((memory["slim"][slot, ky & (WORD - 1)] >> np.uint64(kx & (WORD - 1))) & ONE)
+
+
+@jit_inline
+def is_shut(memory: Row, kx: int, ky: int) -> bool:
+    """Tell whether node (kx, ky) of the place layer is closed to a robot that asks for as much room as it does now."""
+    return is_blocked(memory, kx, ky) and not (memory["room"] == LESS and is_slim(memory, kx, ky))
+
+
 @jit
-def block(memory: Row, kx: int, ky: int, blocked: bool) -> None:
-    """Write into the place layer whether node (kx, ky) is blocked."""
+def block(memory: Row, kx: int, ky: int, blocked: bool, slim: bool) -> None:
+    """Write into the place layer whether node (kx, ky) is blocked, and whether less room would do there."""
     slot = page_of(memory, kx, ky)
     if slot < 0:
         if not blocked:
             return
         slot = _new_page(memory, kx >> PAGE_BITS, ky >> PAGE_BITS)
-    if blocked:
-        memory["rows"][slot, ky & (WORD - 1)] |= bit(kx & (WORD - 1))
-    else:
-        memory["rows"][slot, ky & (WORD - 1)] &= ~bit(kx & (WORD - 1))
+    row, one = ky & (WORD - 1), bit(kx & (WORD - 1))
+    memory["rows"][slot, row] = memory["rows"][slot, row] | one if blocked else memory["rows"][slot, row] & ~one
+    memory["slim"][slot, row] = memory["slim"][slot, row] | one if slim else memory["slim"][slot, row] & ~one
 
 
 @jit_inner
@@ -127,7 +143,7 @@ def _new_page(memory: Row, px: int, py: int) -> int:
     memory["page_at"][at_y, at_x] = slot + 1
     memory["page_x"][slot], memory["page_y"][slot] = px, py
     for k in range(WORD):
-        memory["rows"][slot, k] = ZERO
+        memory["rows"][slot, k] = memory["slim"][slot, k] = ZERO
     return slot
 
 
@@ -176,7 +192,10 @@ def _shift(memory: Row, ex: int, ey: int) -> None:
     x0, y0 = memory["west"] // NODE, memory["south"] // NODE
     for k in range(RIM, NODES - RIM):
         kx, ky = (x0 + out, y0 + k) if ex != 0 else (x0 + k, y0 + out)
-        block(memory, kx, ky, not _any_fits(memory, kx, ky))
+        fits_here = _any_fits(memory, kx, ky)
+        memory["room"] = LESS
+        block(memory, kx, ky, not fits_here, not fits_here and _any_fits(memory, kx, ky))
+        memory["room"] = FULL
     first = 0 if ex + ey > 0 else NODES - 1  # the line that leaves the layer
     for k in range(NODES):
         kx, ky = (x0 + first, y0 + k) if ex != 0 else (x0 + k, y0 + first)
@@ -211,17 +230,34 @@ def _any_fits(memory: Row, kx: int, ky: int) -> bool:
 def block_round(memory: Row, u: float, v: float) -> None:
     """Block the nodes of the place layer from which something at (u, v), beyond the fine layer, is too near."""
     r = memory["disc_r"]
+    less = less_room(r)
     for ky in range(int(math.ceil((v - r - 2) / NODE)), int(math.floor((v + r - 2) / NODE)) + 1):
         for kx in range(int(math.ceil((u - r - 2) / NODE)), int(math.floor((u + r - 2) / NODE)) + 1):
-            if (NODE * kx + 2 - u) ** 2 + (NODE * ky + 2 - v) ** 2 < r * r:
-                block(memory, kx, ky, True)
+            d2 = (NODE * kx + 2 - u) ** 2 + (NODE * ky + 2 - v) ** 2
+            if d2 < r * r:
+                slim = d2 >= less * less and (is_slim(memory, kx, ky) or not is_blocked(memory, kx, ky))
+                block(memory, kx, ky, True, slim)
+
+
+@jit_inline
+def less_room(radius: float) -> float:
+    """Return the radius of the smaller disc [cells]."""
+    return max(LEAST_RADIUS, radius - LESS_ROOM)
 
 
 @jit
-def draw_disc(memory: Row, radius: float) -> None:
-    """Draw the disc of ``radius`` [cells]: the cells whose middle it holds, for a centre in each quarter of a cell."""
-    half = min(DISC_ROWS // 2, int(math.ceil(radius)))
-    memory["disc_half"] = half
+def draw_discs(memory: Row, radius: float) -> None:
+    """Draw the disc of ``radius`` [cells], and the one with less room."""
+    memory["disc_r"] = radius
+    memory["disc_half"] = min(DISC_ROWS // 2, int(math.ceil(radius)))
+    _draw_disc(memory, FULL, radius)
+    _draw_disc(memory, LESS, less_room(radius))
+
+
+@jit_inner
+def _draw_disc(memory: Row, room: int, radius: float) -> None:
+    """Draw a disc: the cells whose middle it holds, for a centre in each quarter of a cell."""
+    half = memory["disc_half"]
     for qy in range(QUARTERS):
         for qx in range(QUARTERS):
             cx, cy = (qx + 0.5) / QUARTERS, (qy + 0.5) / QUARTERS
@@ -231,7 +267,7 @@ def draw_disc(memory: Row, radius: float) -> None:
                     ex, ey = i - half + 0.5 - cx, j - half + 0.5 - cy
                     if ex * ex + ey * ey < radius * radius:
                         row |= bit(i)
-                memory["disc"][qy, qx, j] = row
+                memory["disc"][room, qy, qx, j] = row
 
 
 @jit_inline
@@ -240,18 +276,18 @@ def _disc_fits(memory: Row, u: float, v: float) -> bool:
     ix, iy = int(math.floor(u)), int(math.floor(v))
     half = memory["disc_half"]
     x0, y0 = ix - half, iy - half
-    qx, qy = int(QUARTERS * (u - ix)), int(QUARTERS * (v - iy))
+    qx, qy, room = int(QUARTERS * (u - ix)), int(QUARTERS * (v - iy)), memory["room"]
     shift = x0 & (WORD - 1)
     word = (x0 >> PAGE_BITS) & (WIDE_WORDS - 1)
     if shift + 2 * half < WORD:
         for j in range(2 * half + 1):
             row = memory["fine"][(y0 + j) & (WIDE - 1), word] >> np.uint64(shift)
-            if row & np.uint64(memory["disc"][qy, qx, j]):
+            if row & np.uint64(memory["disc"][room, qy, qx, j]):
                 return False
         return True
     taken = ZERO
     for j in range(2 * half + 1):
-        taken |= row_of(memory, x0, y0 + j) & np.uint64(memory["disc"][qy, qx, j])
+        taken |= row_of(memory, x0, y0 + j) & np.uint64(memory["disc"][room, qy, qx, j])
     return bool(taken == ZERO)
 
 
@@ -267,24 +303,37 @@ def is_fine(memory: Row, u: float, v: float) -> bool:
 def fits(memory: Row, u: float, v: float) -> bool:
     """Tell whether the disc fits at (u, v) by the map."""
     if is_fine(memory, u, v):
-        return _disc_fits(memory, u, v)
+        return _disc_fits(memory, u, v) or (memory["room"] == LESS and _was_slim(memory, u, v))
     west, east = int(math.floor(u - 1.0)) // NODE, int(math.floor(u + 1.0)) // NODE
     south, north = int(math.floor(v - 1.0)) // NODE, int(math.floor(v + 1.0)) // NODE
     # none leaks through between two nodes that touch at a corner
     return not (
-        is_blocked(memory, west, south)
-        or is_blocked(memory, east, north)
-        or is_blocked(memory, west, north)
-        or is_blocked(memory, east, south)
+        is_shut(memory, west, south)
+        or is_shut(memory, east, north)
+        or is_shut(memory, west, north)
+        or is_shut(memory, east, south)
     )
 
 
 @jit_inner
+def _was_slim(memory: Row, u: float, v: float) -> bool:
+    """Tell whether less room did at the node nearest to a place when the fine layer last left it.
+
+    What comes back into it is one cell a node, between which less room does not tell a gap from a wall.
+    """
+    return is_slim(memory, int(math.floor(u)) // NODE, int(math.floor(v)) // NODE)
+
+
+@jit_inner
 def _in_the_way(memory: Row, u: float, v: float) -> bool:
-    """Tell whether a robot that stands for long is in the way of a disc at (u, v)."""
+    """Tell whether a robot that stands for long, or a place kept closed, is in the way of a disc at (u, v)."""
     for k in range(memory["stand_n"]):
         ex, ey = u - memory["stand_u"][k], v - memory["stand_v"][k]
         if ex * ex + ey * ey < memory["stand_r"][k] ** 2:
+            return True
+    for k in range(memory["kept_n"]):
+        ex, ey = u - memory["kept_u"][k], v - memory["kept_v"][k]
+        if ex * ex + ey * ey < memory["kept_r"][k] ** 2:
             return True
     return False
 
@@ -303,12 +352,13 @@ def node_place(memory: Row, kx: int, ky: int) -> tuple[bool, float, float]:
     """
     u, v = float(NODE * kx + 2), float(NODE * ky + 2)
     if not is_fine(memory, u, v):
-        return not is_blocked(memory, kx, ky) and not _in_the_way(memory, u, v), u, v
+        return not is_shut(memory, kx, ky) and not _in_the_way(memory, u, v), u, v
     for k in range(_beside(memory)):
         pu, pv = u + _BESIDE_X[k], v + _BESIDE_Y[k]
         if _disc_fits(memory, pu, pv) and not _in_the_way(memory, pu, pv):
             return True, pu, pv
-    return False, u, v
+    slim = memory["room"] == LESS and is_slim(memory, kx, ky) and not _in_the_way(memory, u, v)
+    return slim, u, v
 
 
 @jit

@@ -65,7 +65,7 @@ def learn(see: View, memory: Row, cell_m: float, deep_m: float) -> None:
             continue
         was_x, was_y = ix, iy
         _hit(memory, here, ix, iy)
-        if deep_m > 0.0 and _is_hidden(see, n, r + deep_m):
+        if deep_m > 0.0 and (r > CLEARS_WITHIN_M or _is_hidden(see, n, r + deep_m)):
             _hit(memory, here, int(math.floor(hu + deep_m * eu)), int(math.floor(hv + deep_m * ev)))
     _clear_passed(see, memory, cell_m)
     memory["ticks"] += 1
@@ -171,12 +171,12 @@ def _clear_passed(see: View, memory: Row, cell_m: float) -> None:
         while row != ZERO:
             ix = x0 + lowest(row)
             row = without_lowest(row)
-            if _is_passed(see, ix + 0.5 - u, iy + 0.5 - v, cell_m):
+            if is_passed(see, ix + 0.5 - u, iy + 0.5 - v, cell_m):
                 _pass(memory, ix, iy, see.percept["now_s"])
 
 
-@jit_inline
-def _is_passed(see: View, du: float, dv: float, cell_m: float) -> bool:
+@jit
+def is_passed(see: View, du: float, dv: float, cell_m: float) -> bool:
     """Tell whether every beam across the cell that lies (du, dv) [cells] from here ends behind it."""
     sensor = see.rig.sensor
     d = cell_m * math.sqrt(du * du + dv * dv)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from swarmscope._jit import jit, jit_inline, jit_inner
-from swarmscope.onboard.mapping.cells import NODE, NODES, PAGE_BITS, RIM, WIDE, node_place, open_way
+from swarmscope.onboard.mapping.cells import LESS, NODE, NODES, PAGE_BITS, RIM, WIDE, node_place, open_way
 from swarmscope.onboard.mapping.memory import CORNERS
 from swarmscope.onboard.mapping.words import ONE, WORD, ZERO, Spot, bit, number
 from swarmscope.onboard.percept import Row
@@ -100,8 +100,11 @@ def _block(memory: Row, frame: Frame) -> None:
         w, y0 = memory["page_x"][k] - (frame.ox >> PAGE_BITS), memory["page_y"][k] * WORD - frame.oy
         if 0 <= w < frame.words and 0 <= y0 < frame.height:
             for y in range(WORD):
+                blocked = memory["rows"][k, y]
+                if memory["room"] == LESS:
+                    blocked &= ~memory["slim"][k, y]
                 for plane in range(3):
-                    scratch[_at(frame, plane, y0 + y, w)] = memory["rows"][k, y]
+                    scratch[_at(frame, plane, y0 + y, w)] = blocked
     x0, y0 = memory["west"] // NODE - frame.ox, memory["south"] // NODE - frame.oy
     for y in range(max(0, y0 + RIM), min(frame.height, y0 + NODES - RIM)):
         for x in range(max(0, x0 + RIM), min(frame.words * WORD, x0 + NODES - RIM)):
@@ -114,6 +117,8 @@ def _block(memory: Row, frame: Frame) -> None:
                     scratch[at] |= bit(x & (WORD - 1))
     for k in range(memory["stand_n"]):
         _close_round(memory, frame, memory["stand_u"][k], memory["stand_v"][k], memory["stand_r"][k])
+    for k in range(memory["kept_n"]):
+        _close_round(memory, frame, memory["kept_u"][k], memory["kept_v"][k], memory["kept_r"][k])
 
 
 @jit_inner

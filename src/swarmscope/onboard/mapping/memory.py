@@ -12,6 +12,8 @@ NEAR = 64
 """Cells on a side of the square round the robot in which it is known how sure each cell is."""
 GONE = 32
 """Cells that are known to have been cleared."""
+KEPT = 16
+"""Places that are kept closed at once."""
 CORNERS = 64
 """Of a way, the goal included."""
 SCRATCH = 12288 + 16
@@ -28,7 +30,9 @@ MAP = np.dtype(
         ("page_y", np.int16, PAGES),
         ("pages_n", np.int64),
         ("rows", np.uint64, (PAGES, WORD)),
-        ("disc", np.uint32, (QUARTERS, QUARTERS, DISC_ROWS)),  # what must be free round a robot
+        ("slim", np.uint64, (PAGES, WORD)),  # nodes that are blocked, but less room would do
+        ("room", np.uint8),  # how much room is asked for now
+        ("disc", np.uint32, (2, QUARTERS, QUARTERS, DISC_ROWS)),  # what must be free round a robot, by room
         ("disc_half", np.int64),  # rows that it has on either side of its middle, 0 = not yet drawn
         ("disc_r", np.float64),  # its radius [cells]
         # how sure: 0 to 15, and in the upper four bits how often the cell has come back
@@ -47,6 +51,14 @@ MAP = np.dtype(
         ("stand_u", np.float32, PEERS),  # [cells]
         ("stand_v", np.float32, PEERS),
         ("stand_r", np.float32, PEERS),  # how far the robot's middle keeps away [cells]
+        # places kept closed: robots that stood there when last seen, gaps that turned out too narrow
+        ("kept_n", np.int64),
+        ("kept_u", np.float32, KEPT),  # [cells]
+        ("kept_v", np.float32, KEPT),
+        ("kept_r", np.float32, KEPT),  # how far the robot's middle keeps away [cells]
+        ("kept_s", np.float64, KEPT),  # until when
+        ("kept_is", np.uint8, KEPT),  # a gap or a robot
+        ("beside_s", np.float64),  # how long something has been between the robot and its next corner
         # the way: corners still ahead, the goal last [cells]
         ("way_u", np.float64, CORNERS),
         ("way_v", np.float64, CORNERS),
@@ -78,6 +90,9 @@ MAP = np.dtype(
 )
 
 
+PER_PAGE = ("rows", "slim", "page_x", "page_y")
+
+
 def new_memory(robots: int) -> np.ndarray:
     """Return the memory of ``robots`` robots that have seen nothing yet."""
     memory = np.zeros(robots, MAP)
@@ -89,7 +104,7 @@ def new_memory(robots: int) -> np.ndarray:
 def used_bytes(memory: Row) -> int:
     """Return how much of its memory a robot has used: pages and scratch as far as they were wanted, all else whole."""
     sizes = {name: MAP[name].itemsize for name in MAP.names or ()}
-    of_pages = sizes["rows"] // PAGES + sizes["page_x"] // PAGES + sizes["page_y"] // PAGES
+    of_pages = sum(sizes[name] // PAGES for name in PER_PAGE)
     of_scratch = sizes["scratch"] // SCRATCH
-    whole = sum(size for name, size in sizes.items() if name not in ("rows", "page_x", "page_y", "scratch"))
+    whole = sum(size for name, size in sizes.items() if name not in (*PER_PAGE, "scratch"))
     return int(whole + of_pages * memory["pages_n"] + of_scratch * memory["scratch_n"])

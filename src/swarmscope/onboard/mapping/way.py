@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from swarmscope._jit import jit, jit_inline, jit_inner
-from swarmscope.onboard.mapping.cells import LEAST_RADIUS, draw_disc, forget_all, is_open, open_way
+from swarmscope.onboard.mapping.cells import FULL, LESS, forget_all, is_open, open_way
 from swarmscope.onboard.mapping.flood import flood
 from swarmscope.onboard.mapping.memory import CORNERS
 from swarmscope.onboard.mapping.search import FOUND, TOO_MANY, shortest
@@ -18,8 +18,6 @@ HALVINGS = 4
 SWEEPS = 2
 REACHED = 0.5
 """A corner so near [cells] is behind."""
-LESS_ROOM = 0.6
-"""By so many cells a robot asks for less room when nothing else is open."""
 LONG = 1.15
 """Times the straight line: a way that is longer is compared with what a flood finds."""
 GOAL_WITHIN = 8
@@ -192,27 +190,30 @@ def _join(memory: Row, here: Spot) -> None:
 
 @jit
 def forget_and_find(memory: Row, here: Spot, goal: Spot) -> int:
-    """Find a way; where the map closes everything, forget first who stands, then ask for less room, then forget all.
+    """Find a way; where the map closes everything, ask first for less room, then forget who stands, then forget all.
 
     Return how far that went, 0 to 3.
     """
     if find_way(memory, here, goal):
         return 0
-    if memory["stand_n"] > 0:
-        stood = memory["stand_n"]
-        memory["stand_n"] = 0
-        ok = find_way(memory, here, goal)
-        memory["stand_n"] = stood
+    if _find_with_less_room(memory, here, goal):
+        return 1
+    stood, kept = memory["stand_n"], memory["kept_n"]
+    if stood + kept > 0:
+        memory["stand_n"], memory["kept_n"] = 0, 0
+        ok = find_way(memory, here, goal) or _find_with_less_room(memory, here, goal)
+        memory["stand_n"], memory["kept_n"] = stood, kept
         if ok:
-            return 1
-    full = memory["disc_r"]
-    memory["disc_r"] = max(LEAST_RADIUS, full - LESS_ROOM)
-    draw_disc(memory, memory["disc_r"])
-    ok = find_way(memory, here, goal)
-    memory["disc_r"] = full
-    draw_disc(memory, full)
-    if ok:
-        return 2
+            return 2
     forget_all(memory)
+    memory["kept_n"] = 0
     find_way(memory, here, goal)
     return 3
+
+
+@jit_inner
+def _find_with_less_room(memory: Row, here: Spot, goal: Spot) -> bool:
+    memory["room"] = LESS
+    ok = find_way(memory, here, goal)
+    memory["room"] = FULL
+    return ok

@@ -18,8 +18,9 @@ from swarmscope.onboard.control.wanting import halt, head_for
 from swarmscope.onboard.deciding.evading import Evading, comes, evade, keep_right
 from swarmscope.onboard.deciding.following import away_from_nearest
 from swarmscope.onboard.deciding.progress import last_speed
-from swarmscope.onboard.mapping.cells import LEAST_RADIUS, draw_disc, open_way
+from swarmscope.onboard.mapping.cells import LEAST_RADIUS, draw_discs, open_way
 from swarmscope.onboard.mapping.evidence import learn
+from swarmscope.onboard.mapping.kept import GAP, ROBOT, keep, review
 from swarmscope.onboard.mapping.memory import MAP, new_memory
 from swarmscope.onboard.mapping.way import find_shorter, forget_and_find, shorten
 from swarmscope.onboard.mapping.words import Spot
@@ -48,6 +49,12 @@ NAME = "atlas"
 SUMMARY = "Atlas: remembers what it has seen closed and goes the shortest way through the rest"
 NEEDS = "own scan, goal bearing and distance, relative poses of visible neighbours, odometry and compass"
 MEMORY = MAP
+ABOUT_M = 0.3
+"""A neighbour so near to where one stood is that one."""
+GAP_M = 0.25
+"""A gap that is too narrow is kept closed so far round its middle."""
+CLOSE_M = 0.4
+"""What is so near in the way to the next corner makes a robot ask whether it can get there at all."""
 FARTHEST_M = 500.0
 """A goal that is farther is gone to as if it were so far."""
 REASONS = (
@@ -98,6 +105,10 @@ class Params(NamedTuple):
     """Who comes towards us so near makes us keep to the right where it is narrow; 0: never."""
     held_s: Seconds = 3.0
     """A robot that has not moved for so long leaves along the longest corridor."""
+    narrow_s: Seconds = 4.0
+    """A gap before which something has been in the way for so long is too narrow."""
+    keep_s: Seconds = 60.0
+    """So long it is kept closed, and the place where a robot stood that is out of sight."""
 
 
 @jit_inline
@@ -106,8 +117,7 @@ def decide(see: View, memory: Row, params: Params) -> None:
     cell = params.cell_m
     percept, shared = see.percept, see.shared
     if memory["disc_half"] == 0:
-        memory["disc_r"] = max(LEAST_RADIUS, (see.rig.body.radius_m + params.margin_m) / cell)
-        draw_disc(memory, memory["disc_r"])
+        draw_discs(memory, max(LEAST_RADIUS, (see.rig.body.radius_m + params.margin_m) / cell))
     if memory["arrived"] or percept["goal_distance"] <= params.arrive_m:
         memory["arrived"] = 1
         halt(see)
@@ -121,16 +131,21 @@ def decide(see: View, memory: Row, params: Params) -> None:
         halt(see)
         see.out["state"], see.out["reason"], see.out["side"] = FOLLOW, R_HELD_NO_NUMBER, 0
         return
-    _note_standing(see, memory, params.still_s, cell)
+    review(see, memory, cell)
+    _note_standing(see, memory, params)
     learn(see, memory, cell, params.deep_m)
     forgot = _keep_way(see, memory, params, here, goal)
     _drive(see, memory, params, here, forgot)
 
 
 @jit_inner
-def _note_standing(see: View, memory: Row, still_s: float, cell: float) -> None:
-    """Note where neighbours stand for long."""
-    shared, n = see.shared, 0
+def _note_standing(see: View, memory: Row, params: Params) -> None:
+    """Note where neighbours stand for long; of those that are not seen any more, that they stood there."""
+    shared, n, cell, still_s = see.shared, 0, params.cell_m, params.still_s
+    for k in range(memory["stand_n"]):
+        place = Spot(float(memory["stand_u"][k]), float(memory["stand_v"][k]))
+        if not _is_tracked(see, place, cell):
+            keep(memory, place, float(memory["stand_r"][k]), see.percept["now_s"] + params.keep_s, ROBOT)
     for t in range(PEERS):
         if shared["track_id"][t] < 0 or moves(see.percept, shared, t, still_s):
             continue
@@ -143,6 +158,19 @@ def _note_standing(see: View, memory: Row, still_s: float, cell: float) -> None:
     elif n < memory["stand_n"]:
         memory["opened"] = 1
     memory["stand_n"] = n
+
+
+@jit_inner
+def _is_tracked(see: View, place: Spot, cell: float) -> bool:
+    """Tell whether there is a neighbour about where one stood."""
+    shared = see.shared
+    for t in range(PEERS):
+        if shared["track_id"][t] >= 0:
+            eu = (shared["x"] + shared["track_x"][t]) / cell - place.u
+            ev = (shared["y"] + shared["track_y"][t]) / cell - place.v
+            if (eu * eu + ev * ev) * cell * cell < ABOUT_M * ABOUT_M:
+                return True
+    return False
 
 
 @jit_inline
@@ -184,7 +212,9 @@ def _drive(see: View, memory: Row, params: Params, here: Spot, forgot: int) -> N
         reason, state = R_LEAVES, ESCAPE
     else:
         ahead = min(far, 1.2)
-        if corridor_length(see.masked, see.rig, bearing, see.rig.body.radius_m + params.room_m, ahead) < ahead:
+        free = corridor_length(see.masked, see.rig, bearing, see.rig.body.radius_m + params.room_m, ahead)
+        _watch_gap(see, memory, params, Gap(bearing, free, free < ahead))
+        if free < ahead:
             heading, found = _nearest_free(see, bearing)
             reason = R_BESIDE
             if found:
@@ -202,6 +232,34 @@ def _drive(see: View, memory: Row, params: Params, here: Spot, forgot: int) -> N
         bearing, speed = evade(see, bearing, speed, params.still_s, _manner(params))
     head_for(see, bearing, speed)
     see.out["state"], see.out["reason"], see.out["side"] = state, reason, 0
+
+
+class Gap(NamedTuple):
+    """What lies towards the next corner."""
+
+    bearing: float
+    free_m: float
+    """As far as the body gets."""
+    is_blocked: bool
+
+
+@jit_inner
+def _watch_gap(see: View, memory: Row, params: Params, gap: Gap) -> None:
+    """Notice a gap that the way leads through and the body does not take; keep it closed for a while."""
+    dt = see.percept["dt_s"]
+    if not (gap.is_blocked and gap.free_m < CLOSE_M):
+        memory["beside_s"] = max(0.0, memory["beside_s"] - dt)
+        return
+    memory["beside_s"] += dt
+    if memory["beside_s"] < params.narrow_s:
+        return
+    memory["beside_s"] = 0.0
+    toward, far = see.percept["compass"] + gap.bearing, gap.free_m + see.rig.body.radius_m
+    place = Spot(
+        (see.shared["x"] + far * math.cos(toward)) / params.cell_m,
+        (see.shared["y"] + far * math.sin(toward)) / params.cell_m,
+    )
+    keep(memory, place, GAP_M / params.cell_m, see.percept["now_s"] + params.keep_s, GAP)
 
 
 @jit_inline
