@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from swarmscope.onboard.mapping.cells import NODE, draw_disc, move_fine_layer, node_place, set_cell
+from swarmscope.onboard.mapping.cells import NODE, draw_discs, move_fine_layer, node_place, set_cell
 from swarmscope.onboard.mapping.memory import new_memory
 
 RADIUS = 3.2
@@ -17,8 +17,7 @@ RADIUS = 3.2
 def map_of(*cells, radius=RADIUS):
     """The map of a robot at the origin that has seen these cells."""
     memory = new_memory(1)[0]
-    memory["disc_r"] = radius
-    draw_disc(memory, radius)
+    draw_discs(memory, radius, 0.9 * radius)
     move_fine_layer(memory, 0, 0)
     for ix, iy in cells:
         set_cell(memory, int(ix), int(iy))

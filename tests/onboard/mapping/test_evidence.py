@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from helpers import circles_world, one_robot, rig_of, scan_at, world_of
-from swarmscope.onboard.mapping.cells import draw_disc, fits, is_set, set_cell
+from swarmscope.onboard.mapping.cells import draw_discs, fits, is_set, set_cell
 from swarmscope.onboard.mapping.evidence import EVERY, learn
 from swarmscope.sim.world import Wall
 
@@ -19,8 +19,7 @@ RIG = rig_of()
 def robot():
     """The rows of a robot that has seen nothing yet, at the origin of its map."""
     bot = one_robot(RIG, "atlas")
-    bot.memory["disc_r"] = 3.2
-    draw_disc(bot.memory, 3.2)
+    draw_discs(bot.memory, 3.2, 2.88)
     return bot
 
 
@@ -63,8 +62,7 @@ def test_things_are_a_little_deep():
 def test_a_return_beyond_the_fine_layer_blocks_its_node():
     rig = rig_of(sensor=RIG.sensor._replace(range_max=30.0))
     bot = one_robot(rig, "atlas")
-    bot.memory["disc_r"] = 3.2
-    draw_disc(bot.memory, 3.2)
+    draw_discs(bot.memory, 3.2, 2.88)
     scan = np.full(rig.sensor.beams, np.inf, np.float32)
     scan[rig.sensor.beams // 2] = 12.0  # straight ahead
     look(bot, scan)

@@ -17,7 +17,7 @@ from swarmscope.onboard.mapping.cells import (
     block,
     block_round,
     clear_cell,
-    draw_disc,
+    draw_discs,
     fits,
     forget_all,
     is_blocked,
@@ -97,7 +97,7 @@ def test_the_farthest_page_makes_room_for_a_new_one():
     memory = map_of()
     nodes = [(64 * (k % 20), 64 * (k // 20)) for k in range(PAGES + 30)]
     for kx, ky in nodes:
-        block(memory, kx, ky, True)
+        block(memory, kx, ky, True, False)
     assert memory["pages_n"] == PAGES
     assert is_blocked(memory, *nodes[-1])
     assert sum(is_blocked(memory, *node) for node in nodes) == PAGES
@@ -105,8 +105,8 @@ def test_the_farthest_page_makes_room_for_a_new_one():
 
 def test_what_lies_a_directory_away_takes_the_same_place():
     memory = map_of()
-    block(memory, 5, 5, True)
-    block(memory, 5 + 32 * 64, 5, True)
+    block(memory, 5, 5, True, False)
+    block(memory, 5 + 32 * 64, 5, True, False)
     assert is_blocked(memory, 5 + 32 * 64, 5)
     assert not is_blocked(memory, 5, 5)
 
@@ -131,7 +131,7 @@ def test_a_gap_that_is_hardly_wider_than_the_robot_lies_beside_a_node():
 
 def test_all_is_forgotten():
     memory = map_of((3, 3))
-    block(memory, 500, 500, True)
+    block(memory, 500, 500, True, False)
     forget_all(memory)
     assert fits(memory, 3.5, 3.5)
     assert not is_blocked(memory, 500, 500)
@@ -139,7 +139,7 @@ def test_all_is_forgotten():
 
 def test_the_disc_of_the_largest_robot_fits_into_its_rows():
     memory = map_of()
-    draw_disc(memory, 50.0)
+    draw_discs(memory, 50.0, 45.0)
     set_cell(memory, 0, 0)
     assert not fits(memory, 3.0, 3.0)
     assert WIDE == 256
@@ -150,7 +150,7 @@ def test_the_disc_of_the_largest_robot_fits_into_its_rows():
 def test_a_wall_of_nodes_that_touch_at_their_corners_does_not_leak(slope):
     memory = map_of()
     for k in range(300):
-        block(memory, 100 + k, 100 + slope * k, True)
+        block(memory, 100 + k, 100 + slope * k, True, False)
     side = -slope * 120.0
     for k in range(20, 280):
         u, v = NODE * (100.0 + k), NODE * (100.0 + slope * k)

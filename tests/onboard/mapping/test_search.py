@@ -142,6 +142,6 @@ def test_a_place_of_64_m_takes_less_than_64_kB():
     memory = map_of()
     for kx in range(-128, 128, 4):
         for ky in range(-128, 128):
-            block(memory, kx, ky, True)
+            block(memory, kx, ky, True, False)
     assert flood(memory, 0.0, 0.0, 500.0, 500.0)
     assert used_bytes(memory) <= 64_000

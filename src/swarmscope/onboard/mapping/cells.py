@@ -40,10 +40,11 @@ STRIDE = 2.0
 """Cells from disc to disc along a way: what lies between two sticks out of both by a tenth of a cell."""
 LEAST_RADIUS = 0.5 * NODE + 0.1
 """Of a disc: a smaller one would fit between two nodes either side of a wall."""
-LESS_ROOM = 0.6
-"""By so many cells a robot asks for less room where nothing else is open."""
-FULL, LESS = 0, 1
-"""How much room is asked for: the robot's own disc, or a smaller one."""
+FULL, LESS, LEAST = range(3)
+"""How much room is asked for: what is wanted, what the guard keeps, or what a body takes that just gets through."""
+ROOMS = 3
+HALF_DIAGONAL = math.sqrt(0.5)
+"""What stands in a cell may be so far from its middle."""
 BESIDE = 5
 _BESIDE_X, _BESIDE_Y = np.array([0, 1, -1, 0, 0]), np.array([0, 0, 0, 1, -1])
 DISC_ROWS = 2 * NODE * RIM + 1
@@ -109,7 +110,7 @@ def is_slim(memory: Row, kx: int, ky: int) -> bool:
 @jit_inline
 def is_shut(memory: Row, kx: int, ky: int) -> bool:
     """Tell whether node (kx, ky) of the place layer is closed to a robot that asks for as much room as it does now."""
-    return is_blocked(memory, kx, ky) and not (memory["room"] == LESS and is_slim(memory, kx, ky))
+    return is_blocked(memory, kx, ky) and not (memory["room"] != FULL and is_slim(memory, kx, ky))
 
 
 @jit
@@ -213,15 +214,16 @@ def _shift(memory: Row, ex: int, ey: int) -> None:
 
 
 @jit_inline
-def _beside(memory: Row) -> int:
-    """Return how many places there are to be at a node. Of two nodes either side of a wall one stays blocked."""
-    return BESIDE if memory["disc_r"] >= 0.5 * NODE + 1.0 else 1
+def _beside(memory: Row) -> float:
+    """Return how far from a node a robot that is at it may be [cells]; of two either side of a wall one stays shut."""
+    return min(1.0, math.floor(QUARTERS * (memory["disc_r"][memory["room"]] - LEAST_RADIUS)) / QUARTERS)
 
 
 @jit_inner
 def _any_fits(memory: Row, kx: int, ky: int) -> bool:
-    for k in range(_beside(memory)):
-        if _disc_fits(memory, float(NODE * kx + 2 + _BESIDE_X[k]), float(NODE * ky + 2 + _BESIDE_Y[k])):
+    aside = _beside(memory)
+    for k in range(BESIDE if aside > 0.0 else 1):
+        if _disc_fits(memory, NODE * kx + 2 + aside * _BESIDE_X[k], NODE * ky + 2 + aside * _BESIDE_Y[k]):
             return True
     return False
 
@@ -229,8 +231,7 @@ def _any_fits(memory: Row, kx: int, ky: int) -> bool:
 @jit
 def block_round(memory: Row, u: float, v: float) -> None:
     """Block the nodes of the place layer from which something at (u, v), beyond the fine layer, is too near."""
-    r = memory["disc_r"]
-    less = less_room(r)
+    r, less = memory["disc_r"][FULL], memory["disc_r"][LESS]
     for ky in range(int(math.ceil((v - r - 2) / NODE)), int(math.floor((v + r - 2) / NODE)) + 1):
         for kx in range(int(math.ceil((u - r - 2) / NODE)), int(math.floor((u + r - 2) / NODE)) + 1):
             d2 = (NODE * kx + 2 - u) ** 2 + (NODE * ky + 2 - v) ** 2
@@ -239,19 +240,16 @@ def block_round(memory: Row, u: float, v: float) -> None:
                 block(memory, kx, ky, True, slim)
 
 
-@jit_inline
-def less_room(radius: float) -> float:
-    """Return the radius of the smaller disc [cells]."""
-    return max(LEAST_RADIUS, radius - LESS_ROOM)
-
-
 @jit
-def draw_discs(memory: Row, radius: float) -> None:
-    """Draw the disc of ``radius`` [cells], and the one with less room."""
-    memory["disc_r"] = radius
-    memory["disc_half"] = min(DISC_ROWS // 2, int(math.ceil(radius)))
-    _draw_disc(memory, FULL, radius)
-    _draw_disc(memory, LESS, less_room(radius))
+def draw_discs(memory: Row, full: float, less: float) -> None:
+    """Draw the discs: of the radius [cells] that is wanted, of the one that the guard keeps, and the least."""
+    full = max(LEAST_RADIUS, full)
+    less = min(full, max(LEAST_RADIUS, less))
+    memory["disc_r"][FULL], memory["disc_r"][LESS] = full, less
+    memory["disc_r"][LEAST] = max(LEAST_RADIUS, less - HALF_DIAGONAL)
+    memory["disc_half"] = min(DISC_ROWS // 2, int(math.ceil(full)))
+    for room in range(ROOMS):
+        _draw_disc(memory, room, memory["disc_r"][room])
 
 
 @jit_inner
@@ -303,7 +301,7 @@ def is_fine(memory: Row, u: float, v: float) -> bool:
 def fits(memory: Row, u: float, v: float) -> bool:
     """Tell whether the disc fits at (u, v) by the map."""
     if is_fine(memory, u, v):
-        return _disc_fits(memory, u, v) or (memory["room"] == LESS and _was_slim(memory, u, v))
+        return _disc_fits(memory, u, v) or (memory["room"] != FULL and _was_slim(memory, u, v))
     west, east = int(math.floor(u - 1.0)) // NODE, int(math.floor(u + 1.0)) // NODE
     south, north = int(math.floor(v - 1.0)) // NODE, int(math.floor(v + 1.0)) // NODE
     # none leaks through between two nodes that touch at a corner
@@ -353,11 +351,12 @@ def node_place(memory: Row, kx: int, ky: int) -> tuple[bool, float, float]:
     u, v = float(NODE * kx + 2), float(NODE * ky + 2)
     if not is_fine(memory, u, v):
         return not is_shut(memory, kx, ky) and not _in_the_way(memory, u, v), u, v
-    for k in range(_beside(memory)):
-        pu, pv = u + _BESIDE_X[k], v + _BESIDE_Y[k]
+    aside = _beside(memory)
+    for k in range(BESIDE if aside > 0.0 else 1):
+        pu, pv = u + aside * _BESIDE_X[k], v + aside * _BESIDE_Y[k]
         if _disc_fits(memory, pu, pv) and not _in_the_way(memory, pu, pv):
             return True, pu, pv
-    slim = memory["room"] == LESS and is_slim(memory, kx, ky) and not _in_the_way(memory, u, v)
+    slim = memory["room"] != FULL and is_slim(memory, kx, ky) and not _in_the_way(memory, u, v)
     return slim, u, v
 
 

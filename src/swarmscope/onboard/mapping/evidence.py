@@ -12,6 +12,8 @@ import math
 from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.geometry import point_segment_distance, rough_angle
 from swarmscope.onboard.mapping.cells import (
+    FULL,
+    HALF_DIAGONAL,
     block_round,
     clear_cell,
     is_near,
@@ -37,7 +39,6 @@ HIDDEN_M = 0.1
 """What is behind a hit is hidden when beams so far beside it do not get there either."""
 EVERY = 4
 """A cell is looked at for being passed in one tick of so many."""
-HALF_DIAGONAL = math.sqrt(0.5)
 
 
 @jit
@@ -133,7 +134,7 @@ def _closes(memory: Row, u: float, v: float, hu: float, hv: float) -> bool:
     au, av = u, v
     for k in range(memory["way_n"]):
         bu, bv = memory["way_u"][k], memory["way_v"][k]
-        if point_segment_distance(hu, hv, au, av, bu, bv) < memory["disc_r"]:
+        if point_segment_distance(hu, hv, au, av, bu, bv) < memory["disc_r"][FULL]:
             return True
         au, av = bu, bv
     return False

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from swarmscope.onboard.mapping.cells import DIRECTORY, DISC_ROWS, PAGES, QUARTERS, WIDE, WIDE_WORDS
+from swarmscope.onboard.mapping.cells import DIRECTORY, DISC_ROWS, PAGES, QUARTERS, ROOMS, WIDE, WIDE_WORDS
 from swarmscope.onboard.mapping.words import WORD
 from swarmscope.onboard.percept import NEVER_S, PEERS, Row
 
@@ -32,9 +32,9 @@ MAP = np.dtype(
         ("rows", np.uint64, (PAGES, WORD)),
         ("slim", np.uint64, (PAGES, WORD)),  # nodes that are blocked, but less room would do
         ("room", np.uint8),  # how much room is asked for now
-        ("disc", np.uint32, (2, QUARTERS, QUARTERS, DISC_ROWS)),  # what must be free round a robot, by room
+        ("disc", np.uint32, (ROOMS, QUARTERS, QUARTERS, DISC_ROWS)),  # what must be free round a robot
         ("disc_half", np.int64),  # rows that it has on either side of its middle, 0 = not yet drawn
-        ("disc_r", np.float64),  # its radius [cells]
+        ("disc_r", np.float64, ROOMS),  # its radius [cells]
         # how sure: 0 to 15, and in the upper four bits how often the cell has come back
         ("evidence", np.uint8, (NEAR, NEAR)),
         # cells that have been cleared, the newest over the oldest: where, how often, when last

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from swarmscope._jit import jit, jit_inline, jit_inner
-from swarmscope.onboard.mapping.cells import FULL, LESS, forget_all, is_open, open_way
+from swarmscope.onboard.mapping.cells import FULL, LEAST, LESS, forget_all, is_open, open_way
 from swarmscope.onboard.mapping.flood import flood
 from swarmscope.onboard.mapping.memory import CORNERS
 from swarmscope.onboard.mapping.search import FOUND, TOO_MANY, shortest
@@ -190,7 +190,7 @@ def _join(memory: Row, here: Spot) -> None:
 
 @jit
 def forget_and_find(memory: Row, here: Spot, goal: Spot) -> int:
-    """Find a way; where the map closes everything, ask first for less room, then forget who stands, then forget all.
+    """Find a way; where the map closes everything, ask for less room, then forget who stands, then forget all.
 
     Return how far that went, 0 to 3.
     """
@@ -213,7 +213,10 @@ def forget_and_find(memory: Row, here: Spot, goal: Spot) -> int:
 
 @jit_inner
 def _find_with_less_room(memory: Row, here: Spot, goal: Spot) -> bool:
-    memory["room"] = LESS
-    ok = find_way(memory, here, goal)
+    """Find a way through what the guard lets pass, else through what may be as wide as that: maps err by a cell."""
+    ok = False
+    for room in (LESS, LEAST):
+        memory["room"] = room
+        ok = ok or find_way(memory, here, goal)
     memory["room"] = FULL
     return ok

@@ -18,7 +18,7 @@ from swarmscope.onboard.control.wanting import halt, head_for
 from swarmscope.onboard.deciding.evading import Evading, comes, evade, keep_right
 from swarmscope.onboard.deciding.following import away_from_nearest
 from swarmscope.onboard.deciding.progress import last_speed
-from swarmscope.onboard.mapping.cells import LEAST_RADIUS, draw_discs, open_way
+from swarmscope.onboard.mapping.cells import draw_discs, open_way
 from swarmscope.onboard.mapping.evidence import learn
 from swarmscope.onboard.mapping.kept import GAP, ROBOT, keep, review
 from swarmscope.onboard.mapping.memory import MAP, new_memory
@@ -117,7 +117,7 @@ def decide(see: View, memory: Row, params: Params) -> None:
     cell = params.cell_m
     percept, shared = see.percept, see.shared
     if memory["disc_half"] == 0:
-        draw_discs(memory, max(LEAST_RADIUS, (see.rig.body.radius_m + params.margin_m) / cell))
+        draw_discs(memory, (see.rig.body.radius_m + params.margin_m) / cell, see.rig.footprint / cell)
     if memory["arrived"] or percept["goal_distance"] <= params.arrive_m:
         memory["arrived"] = 1
         halt(see)
