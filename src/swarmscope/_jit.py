@@ -109,7 +109,9 @@ def _cached_in(folder: Path | None) -> Iterator[None]:
         config.CACHE_DIR = before
 
 
-OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
+OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy", "forceinline": False}
+"""``forceinline`` is said because a kernel that is compiled for another one takes from it what is not: whatever an
+inlined kernel calls would be inlined, too, with all that it calls, and that takes minutes."""
 LEAN = OPTIONS | {"_nrt": False, "no_cfunc_wrapper": True}
 """Without Numba's runtime (``_nrt=False``) arrays are not reference-counted, which costs more than the work in
 short kernels, and a kernel that allocates does not compile."""

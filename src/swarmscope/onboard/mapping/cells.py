@@ -100,14 +100,14 @@ def is_blocked(memory: Row, kx: int, ky: int) -> bool:
     return slot >= 0 and bool((memory["rows"][slot, ky & (WORD - 1)] >> np.uint64(kx & (WORD - 1))) & ONE)
 
 
-@jit_inline
+@jit
 def is_slim(memory: Row, kx: int, ky: int) -> bool:
     """Tell whether a disc with less room did fit at node (kx, ky) when the fine layer last left it."""
     slot = page_of(memory, kx, ky)
     return slot >= 0 and bool((memory["slim"][slot, ky & (WORD - 1)] >> np.uint64(kx & (WORD - 1))) & ONE)
 
 
-@jit_inline
+@jit
 def is_shut(memory: Row, kx: int, ky: int) -> bool:
     """Tell whether node (kx, ky) of the place layer is closed to a robot that asks for as much room as it does now."""
     return is_blocked(memory, kx, ky) and not (memory["room"] != FULL and is_slim(memory, kx, ky))
@@ -213,7 +213,7 @@ def _shift(memory: Row, ex: int, ey: int) -> None:
             set_cell(memory, NODE * kx + 2, NODE * ky + 2)
 
 
-@jit_inline
+@jit_inner
 def _beside(memory: Row) -> float:
     """Return how far from a node a robot that is at it may be [cells]; of two either side of a wall one stays shut."""
     return min(1.0, math.floor(QUARTERS * (memory["disc_r"][memory["room"]] - LEAST_RADIUS)) / QUARTERS)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from swarmscope._jit import jit, jit_inline, jit_inner
-from swarmscope.onboard.mapping.cells import FULL, LEAST, LESS, forget_all, is_open, open_way
+from swarmscope.onboard.mapping.cells import FULL, ROOMS, forget_all, is_open, open_way
 from swarmscope.onboard.mapping.flood import flood
 from swarmscope.onboard.mapping.memory import CORNERS
 from swarmscope.onboard.mapping.search import FOUND, TOO_MANY, shortest
@@ -192,31 +192,24 @@ def _join(memory: Row, here: Spot) -> None:
 def forget_and_find(memory: Row, here: Spot, goal: Spot) -> int:
     """Find a way; where the map closes everything, ask for less room, then forget who stands, then forget all.
 
-    Return how far that went, 0 to 3.
+    Less room is what the guard lets pass, then what may be as wide as that: maps err by a cell. Return how far that
+    went, 0 to 3.
     """
-    if find_way(memory, here, goal):
-        return 0
-    if _find_with_less_room(memory, here, goal):
-        return 1
     stood, kept = memory["stand_n"], memory["kept_n"]
-    if stood + kept > 0:
-        memory["stand_n"], memory["kept_n"] = 0, 0
-        ok = find_way(memory, here, goal) or _find_with_less_room(memory, here, goal)
-        memory["stand_n"], memory["kept_n"] = stood, kept
-        if ok:
-            return 2
-    forget_all(memory)
-    memory["kept_n"] = 0
-    find_way(memory, here, goal)
-    return 3
-
-
-@jit_inner
-def _find_with_less_room(memory: Row, here: Spot, goal: Spot) -> bool:
-    """Find a way through what the guard lets pass, else through what may be as wide as that: maps err by a cell."""
-    ok = False
-    for room in (LESS, LEAST):
-        memory["room"] = room
-        ok = ok or find_way(memory, here, goal)
-    memory["room"] = FULL
-    return ok
+    found, tries = False, 0
+    while not found and tries < 2 * ROOMS + 1:
+        if tries == ROOMS:
+            if stood + kept == 0:
+                tries = 2 * ROOMS
+            memory["stand_n"] = memory["kept_n"] = 0
+        if tries == 2 * ROOMS:
+            forget_all(memory)
+            kept = 0
+        memory["room"] = tries % ROOMS
+        found = find_way(memory, here, goal)
+        tries += 1
+    memory["room"], memory["stand_n"], memory["kept_n"] = FULL, stood, kept
+    last = tries - 1
+    if last < ROOMS:
+        return min(last, 1)
+    return 2 if last < 2 * ROOMS else 3
