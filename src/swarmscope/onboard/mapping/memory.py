@@ -63,6 +63,7 @@ MAP = np.dtype(
         ("way_u", np.float64, CORNERS),
         ("way_v", np.float64, CORNERS),
         ("way_n", np.int64),  # 0 = there is none
+        ("way_room", np.uint8),  # how much room it leaves
         ("old_u", np.float32, CORNERS),  # the way before the last search
         ("old_v", np.float32, CORNERS),
         ("other_u", np.float32, CORNERS),  # the way that another search has found

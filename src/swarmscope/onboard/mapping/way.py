@@ -20,6 +20,8 @@ REACHED = 0.5
 """A corner so near [cells] is behind."""
 LONG = 1.15
 """Times the straight line: a way that is longer is compared with what a flood finds."""
+START_WITHIN = 3
+"""A robot in a gap that is hardly wide enough is a little beside where it fits by its map: it counts as being there."""
 GOAL_WITHIN = 8
 """A goal that is not open is gone to as near as a place so many cells from it."""
 
@@ -32,7 +34,7 @@ def find_way(memory: Row, here: Spot, goal: Spot) -> bool:
     if not _search(memory, here, Spot(gu, gv)):
         memory["failures"] += 1
         return False
-    memory["closed"] = 0
+    memory["closed"], memory["way_room"] = 0, memory["room"]
     n = memory["way_n"]
     if gu != goal.u or gv != goal.v:
         n = min(CORNERS, n + 1)
@@ -79,18 +81,26 @@ def _copy(from_u: np.ndarray, from_v: np.ndarray, to_u: np.ndarray, to_v: np.nda
         to_u[k], to_v[k] = from_u[k], from_v[k]
 
 
-@jit_inner
+@jit_inline
 def _goal_place(memory: Row, u: float, v: float) -> tuple[float, float]:
     """Return the goal, or where it is not open the nearest open place to it."""
+    place = nearest_open(memory, Spot(u, v), GOAL_WITHIN)
+    return place.u, place.v
+
+
+@jit
+def nearest_open(memory: Row, here: Spot, within: int) -> Spot:
+    """Return the open place that is nearest, ``within`` so many cells; the place itself where there is none."""
+    u, v = here.u, here.v
     if is_open(memory, u, v):
-        return u, v
+        return here
     best, at_u, at_v = math.inf, u, v
-    for y in range(-GOAL_WITHIN, GOAL_WITHIN + 1):
-        for x in range(-GOAL_WITHIN, GOAL_WITHIN + 1):
+    for y in range(-within, within + 1):
+        for x in range(-within, within + 1):
             d = x * x + y * y
             if d < best and is_open(memory, u + x, v + y):
                 best, at_u, at_v = d, u + x, v + y
-    return at_u, at_v
+    return Spot(at_u, at_v)
 
 
 @jit
