@@ -43,6 +43,7 @@ LEAST_RADIUS = 0.5 * NODE + 0.1
 FULL, LESS, LEAST = range(3)
 """How much room is asked for: what is wanted, what the guard keeps, or what a body takes that just gets through."""
 ROOMS = 3
+PHASES = 4
 HALF_DIAGONAL = math.sqrt(0.5)
 """What stands in a cell may be so far from its middle."""
 BESIDE = 5
@@ -346,10 +347,13 @@ def is_open(memory: Row, u: float, v: float) -> bool:
 def node_place(memory: Row, kx: int, ky: int) -> tuple[bool, float, float]:
     """Return whether the robot may be at node (kx, ky) or a cell beside it, and where.
 
-    A gap that is hardly wider than the robot lies between the nodes more often than not.
+    A gap that is hardly wider than the robot lies between the nodes more often than not. The nodes of the fine layer may
+    be moved on by half of the way to the next (``phase`` 1 to 3): then they lie where gaps were missed.
     """
     u, v = float(NODE * kx + 2), float(NODE * ky + 2)
-    if not is_fine(memory, u, v):
+    if is_fine(memory, u, v):
+        u, v = u + 2.0 * (memory["phase"] & 1), v + 2.0 * (memory["phase"] >> 1)
+    else:
         return not is_shut(memory, kx, ky) and not _in_the_way(memory, u, v), u, v
     aside = _beside(memory)
     for k in range(BESIDE if aside > 0.0 else 1):

@@ -32,6 +32,7 @@ MAP = np.dtype(
         ("rows", np.uint64, (PAGES, WORD)),
         ("slim", np.uint64, (PAGES, WORD)),  # nodes that are blocked, but less room would do
         ("room", np.uint8),  # how much room is asked for now
+        ("phase", np.int64),  # how the fine layer's nodes are moved now
         ("disc", np.uint32, (ROOMS, QUARTERS, QUARTERS, DISC_ROWS)),  # what must be free round a robot
         ("disc_half", np.int64),  # rows that it has on either side of its middle, 0 = not yet drawn
         ("disc_r", np.float64, ROOMS),  # its radius [cells]
@@ -51,6 +52,7 @@ MAP = np.dtype(
         ("stand_u", np.float32, PEERS),  # [cells]
         ("stand_v", np.float32, PEERS),
         ("stand_r", np.float32, PEERS),  # how far the robot's middle keeps away [cells]
+        ("stand_s", np.float64, PEERS),  # since when
         # places kept closed: robots that stood there when last seen, gaps that turned out too narrow
         ("kept_n", np.int64),
         ("kept_u", np.float32, KEPT),  # [cells]

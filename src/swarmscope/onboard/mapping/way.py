@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from swarmscope._jit import jit, jit_inline, jit_inner
-from swarmscope.onboard.mapping.cells import FULL, ROOMS, forget_all, is_open, open_way
+from swarmscope.onboard.mapping.cells import FULL, PHASES, ROOMS, forget_all, is_open, open_way
 from swarmscope.onboard.mapping.flood import flood
 from swarmscope.onboard.mapping.memory import CORNERS
 from swarmscope.onboard.mapping.search import FOUND, TOO_MANY, shortest
@@ -67,11 +67,16 @@ def _search(memory: Row, here: Spot, goal: Spot) -> bool:
         memory["way_n"] = n
         _copy(memory["other_u"], memory["other_v"], memory["way_u"], memory["way_v"], n)
         return True
-    memory["floods"] += 1
-    if not flood(memory, here.u, here.v, goal.u, goal.v):
-        return False
-    tighten(memory, here.u, here.v)
-    return True
+    reached = False
+    for phase in range(PHASES if memory["room"] == FULL else 1):
+        if not reached:
+            memory["phase"] = phase
+            memory["floods"] += 1
+            reached = flood(memory, here.u, here.v, goal.u, goal.v)
+    memory["phase"] = 0
+    if reached:
+        tighten(memory, here.u, here.v)
+    return reached
 
 
 @jit_inline

@@ -108,7 +108,7 @@ class Params(NamedTuple):
     narrow_s: Seconds = 4.0
     """A gap before which something has been in the way for so long is too narrow."""
     keep_s: Seconds = 60.0
-    """So long it is kept closed, and the place where a robot stood that is out of sight."""
+    """So long it is kept closed; the place of a robot that is out of sight as long as that had stood there, at most."""
 
 
 @jit_inline
@@ -145,13 +145,16 @@ def _note_standing(see: View, memory: Row, params: Params) -> None:
     for k in range(memory["stand_n"]):
         place = Spot(float(memory["stand_u"][k]), float(memory["stand_v"][k]))
         if not _is_tracked(see, place, cell):
-            keep(memory, place, float(memory["stand_r"][k]), see.percept["now_s"] + params.keep_s, ROBOT)
+            now = see.percept["now_s"]
+            stood = min(params.keep_s, now - memory["stand_s"][k])
+            keep(memory, place, float(memory["stand_r"][k]), now + stood, ROBOT)
     for t in range(PEERS):
         if shared["track_id"][t] < 0 or moves(see.percept, shared, t, still_s):
             continue
         memory["stand_u"][n] = (shared["x"] + shared["track_x"][t]) / cell
         memory["stand_v"][n] = (shared["y"] + shared["track_y"][t]) / cell
         memory["stand_r"][n] = (shared["track_radius"][t] + see.rig.footprint) / cell
+        memory["stand_s"][n] = shared["track_moved_s"][t]
         n += 1
     if n > memory["stand_n"]:
         memory["closed"] = 1
