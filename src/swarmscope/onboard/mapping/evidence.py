@@ -172,12 +172,12 @@ def _clear_passed(see: View, memory: Row, cell_m: float) -> None:
         while row != ZERO:
             ix = x0 + lowest(row)
             row = without_lowest(row)
-            if is_passed(see, ix + 0.5 - u, iy + 0.5 - v, cell_m):
+            if _is_passed(see, ix + 0.5 - u, iy + 0.5 - v, cell_m):
                 _pass(memory, ix, iy, see.percept["now_s"])
 
 
-@jit
-def is_passed(see: View, du: float, dv: float, cell_m: float) -> bool:
+@jit_inline
+def _is_passed(see: View, du: float, dv: float, cell_m: float) -> bool:
     """Tell whether every beam across the cell that lies (du, dv) [cells] from here ends behind it."""
     sensor = see.rig.sensor
     d = cell_m * math.sqrt(du * du + dv * dv)

@@ -52,14 +52,12 @@ MAP = np.dtype(
         ("stand_u", np.float32, PEERS),  # [cells]
         ("stand_v", np.float32, PEERS),
         ("stand_r", np.float32, PEERS),  # how far the robot's middle keeps away [cells]
-        ("stand_s", np.float64, PEERS),  # since when
-        # places kept closed: robots that stood there when last seen, gaps that turned out too narrow
+        # places kept closed: gaps that turned out too narrow
         ("kept_n", np.int64),
         ("kept_u", np.float32, KEPT),  # [cells]
         ("kept_v", np.float32, KEPT),
         ("kept_r", np.float32, KEPT),  # how far the robot's middle keeps away [cells]
         ("kept_s", np.float64, KEPT),  # until when
-        ("kept_is", np.uint8, KEPT),  # a gap or a robot
         ("beside_s", np.float64),  # how long something has been between the robot and its next corner
         # the way: corners still ahead, the goal last [cells]
         ("way_u", np.float64, CORNERS),

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from swarmscope._jit import jit, jit_inline, jit_inner
-from swarmscope.onboard.mapping.cells import FULL, PHASES, ROOMS, forget_all, is_open, open_way
+from swarmscope.onboard.mapping.cells import FULL, LEAST, LESS, PHASES, forget_all, is_open, open_way
 from swarmscope.onboard.mapping.flood import flood
 from swarmscope.onboard.mapping.memory import CORNERS
 from swarmscope.onboard.mapping.search import FOUND, TOO_MANY, shortest
@@ -20,6 +20,8 @@ REACHED = 0.5
 """A corner so near [cells] is behind."""
 LONG = 1.15
 """Times the straight line: a way that is longer is compared with what a flood finds."""
+WHOLE, NOBODY, LESS_ROOM, LEAST_ROOM, AGAIN, NOTHING = range(6)
+"""What a search goes by: all that is known; without robots that stand; less and less; nothing."""
 START_WITHIN = 3
 """A robot in a gap that is hardly wide enough is a little beside where it fits by its map: it counts as being there."""
 GOAL_WITHIN = 8
@@ -205,26 +207,33 @@ def _join(memory: Row, here: Spot) -> None:
 
 @jit
 def forget_and_find(memory: Row, here: Spot, goal: Spot) -> int:
-    """Find a way; where the map closes everything, ask for less room, then forget who stands, then forget all.
+    """Find a way; where the map closes everything, forget who stands, ask for less room, then forget all.
 
-    Less room is what the guard lets pass, then what may be as wide as that: maps err by a cell. Return how far that
-    went, 0 to 3.
+    Less room is what the guard lets pass, then what may be as wide as that, since maps err by a cell, then gaps that
+    turned out too narrow before. Return how far that went, 0 to 3.
     """
     stood, kept = memory["stand_n"], memory["kept_n"]
-    found, tries = False, 0
-    while not found and tries < 2 * ROOMS + 1:
-        if tries == ROOMS:
-            if stood + kept == 0:
-                tries = 2 * ROOMS
-            memory["stand_n"] = memory["kept_n"] = 0
-        if tries == 2 * ROOMS:
+    step = WHOLE
+    while True:
+        if step == NOBODY:
+            memory["stand_n"] = 0
+        elif step == LESS_ROOM:
+            memory["room"] = LESS
+        elif step == LEAST_ROOM:
+            memory["room"] = LEAST
+        elif step == AGAIN:
+            memory["kept_n"] = 0
+        elif step == NOTHING:
+            kept, memory["room"] = 0, FULL
             forget_all(memory)
-            kept = 0
-        memory["room"] = tries % ROOMS
-        found = find_way(memory, here, goal)
-        tries += 1
+        if find_way(memory, here, goal) or step == NOTHING:
+            break
+        step += 1
+        if step == NOBODY and stood == 0:
+            step += 1
+        if step == AGAIN and kept == 0:
+            step += 1
     memory["room"], memory["stand_n"], memory["kept_n"] = FULL, stood, kept
-    last = tries - 1
-    if last < ROOMS:
-        return min(last, 1)
-    return 2 if last < 2 * ROOMS else 3
+    if step <= NOBODY:
+        return step
+    return 3 if step == NOTHING else 2

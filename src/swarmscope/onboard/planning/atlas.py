@@ -20,7 +20,7 @@ from swarmscope.onboard.deciding.following import away_from_nearest
 from swarmscope.onboard.deciding.progress import last_speed
 from swarmscope.onboard.mapping.cells import FULL, draw_discs, open_way
 from swarmscope.onboard.mapping.evidence import learn
-from swarmscope.onboard.mapping.kept import GAP, ROBOT, keep, review
+from swarmscope.onboard.mapping.kept import keep, review
 from swarmscope.onboard.mapping.memory import MAP, new_memory
 from swarmscope.onboard.mapping.way import START_WITHIN, find_shorter, forget_and_find, nearest_open, shorten
 from swarmscope.onboard.mapping.words import Spot
@@ -49,12 +49,11 @@ NAME = "atlas"
 SUMMARY = "Atlas: remembers what it has seen closed and goes the shortest way through the rest"
 NEEDS = "own scan, goal bearing and distance, relative poses of visible neighbours, odometry and compass"
 MEMORY = MAP
-ABOUT_M = 0.3
-"""A neighbour so near to where one stood is that one."""
 GAP_M = 0.25
 """A gap that is too narrow is kept closed so far round its middle."""
 CLOSE_M = 0.4
 """What is so near in the way to the next corner makes a robot ask whether it can get there at all."""
+COMPANY_M = 1.5
 FARTHEST_M = 500.0
 """A goal that is farther is gone to as if it were so far."""
 REASONS = (
@@ -108,7 +107,7 @@ class Params(NamedTuple):
     narrow_s: Seconds = 4.0
     """A gap before which something has been in the way for so long is too narrow."""
     keep_s: Seconds = 60.0
-    """So long it is kept closed; the place of a robot that is out of sight as long as that had stood there, at most."""
+    """So long it is kept closed."""
 
 
 @jit_inline
@@ -131,49 +130,29 @@ def decide(see: View, memory: Row, params: Params) -> None:
         halt(see)
         see.out["state"], see.out["reason"], see.out["side"] = FOLLOW, R_HELD_NO_NUMBER, 0
         return
-    review(see, memory, cell)
-    _note_standing(see, memory, params)
+    review(memory, see.percept["now_s"])
+    _note_standing(see, memory, params.still_s, cell)
     learn(see, memory, cell, params.deep_m)
     forgot = _keep_way(see, memory, params, here, goal)
     _drive(see, memory, params, here, forgot)
 
 
 @jit_inner
-def _note_standing(see: View, memory: Row, params: Params) -> None:
-    """Note where neighbours stand for long; of those that are not seen any more, that they stood there."""
-    shared, n, cell, still_s = see.shared, 0, params.cell_m, params.still_s
-    for k in range(memory["stand_n"]):
-        place = Spot(float(memory["stand_u"][k]), float(memory["stand_v"][k]))
-        if not _is_tracked(see, place, cell):
-            now = see.percept["now_s"]
-            stood = min(params.keep_s, now - memory["stand_s"][k])
-            keep(memory, place, float(memory["stand_r"][k]), now + stood, ROBOT)
+def _note_standing(see: View, memory: Row, still_s: float, cell: float) -> None:
+    """Note where neighbours stand for long."""
+    shared, n = see.shared, 0
     for t in range(PEERS):
         if shared["track_id"][t] < 0 or moves(see.percept, shared, t, still_s):
             continue
         memory["stand_u"][n] = (shared["x"] + shared["track_x"][t]) / cell
         memory["stand_v"][n] = (shared["y"] + shared["track_y"][t]) / cell
         memory["stand_r"][n] = (shared["track_radius"][t] + see.rig.footprint) / cell
-        memory["stand_s"][n] = shared["track_moved_s"][t]
         n += 1
     if n > memory["stand_n"]:
         memory["closed"] = 1
     elif n < memory["stand_n"]:
         memory["opened"] = 1
     memory["stand_n"] = n
-
-
-@jit_inner
-def _is_tracked(see: View, place: Spot, cell: float) -> bool:
-    """Tell whether there is a neighbour about where one stood."""
-    shared = see.shared
-    for t in range(PEERS):
-        if shared["track_id"][t] >= 0:
-            eu = (shared["x"] + shared["track_x"][t]) / cell - place.u
-            ev = (shared["y"] + shared["track_y"][t]) / cell - place.v
-            if (eu * eu + ev * ev) * cell * cell < ABOUT_M * ABOUT_M:
-                return True
-    return False
 
 
 @jit_inline
@@ -251,11 +230,23 @@ class Gap(NamedTuple):
 
 
 @jit_inner
+def _has_company(see: View) -> bool:
+    """Tell whether a neighbour is near: then it is the neighbour that is waited for, and not the gap that is narrow."""
+    shared = see.shared
+    for t in range(PEERS):
+        if shared["track_id"][t] >= 0 and shared["track_x"][t] ** 2 + shared["track_y"][t] ** 2 < COMPANY_M * COMPANY_M:
+            return True
+    return False
+
+
+@jit_inner
 def _watch_gap(see: View, memory: Row, params: Params, gap: Gap) -> None:
     """Notice a gap that the way leads through and the body does not take; keep it closed for a while."""
     dt = see.percept["dt_s"]
     if not (gap.is_blocked and gap.free_m < CLOSE_M):
         memory["beside_s"] = max(0.0, memory["beside_s"] - dt)
+        return
+    if _has_company(see):
         return
     memory["beside_s"] += dt
     if memory["beside_s"] < params.narrow_s:
@@ -266,7 +257,7 @@ def _watch_gap(see: View, memory: Row, params: Params, gap: Gap) -> None:
         (see.shared["x"] + far * math.cos(toward)) / params.cell_m,
         (see.shared["y"] + far * math.sin(toward)) / params.cell_m,
     )
-    keep(memory, place, GAP_M / params.cell_m, see.percept["now_s"] + params.keep_s, GAP)
+    keep(memory, place, GAP_M / params.cell_m, see.percept["now_s"] + params.keep_s)
 
 
 @jit_inline
