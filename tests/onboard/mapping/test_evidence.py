@@ -10,7 +10,7 @@ import pytest
 from helpers import circles_world, one_robot, rig_of, scan_at, world_of
 from swarmscope.onboard.mapping.cells import draw_discs, fits, is_set, set_cell
 from swarmscope.onboard.mapping.evidence import EVERY, learn
-from swarmscope.sim.world import Wall
+from swarmscope.sim.world import Polygon, Wall
 
 CELL = 0.0625
 RIG = rig_of()
@@ -57,6 +57,16 @@ def test_things_are_a_little_deep():
     look(bot, scan_at(world_of(Wall(points=[(1.03, -3.0), (1.03, 3.0)])), RIG), deep=3 * CELL)
     assert is_set(bot.memory, *cell(1.03 + 3 * CELL, 0.0))
     assert not is_set(bot.memory, *cell(1.03 + 6 * CELL, 0.0))
+
+
+def test_nothing_is_put_beside_the_corner_of_a_near_thing():
+    """Beams that graze a face near its end go on beyond the thing; a robot must not close the gap there."""
+    bot = robot()
+    thing = Polygon(points=[(0.5, 0.3), (1.0, 0.3), (1.0, 1.0), (0.5, 1.0)])
+    look(bot, scan_at(world_of(thing), RIG), deep=0.15)
+    beside = [(x, y) for x in np.arange(1.0 + CELL, 1.4, CELL) for y in np.arange(0.2, 1.1, CELL)]
+    assert not any(is_set(bot.memory, *cell(x, y)) for x, y in beside)
+    assert is_set(bot.memory, *cell(0.62, 0.42))
 
 
 def test_a_return_beyond_the_fine_layer_blocks_its_node():

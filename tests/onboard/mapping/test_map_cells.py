@@ -11,9 +11,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmscope.onboard.mapping.cells import (
+    DIRECTORY,
+    FULL,
+    LESS,
     NODE,
     PAGES,
     WIDE,
+    ask_for,
     block,
     block_round,
     clear_cell,
@@ -24,6 +28,7 @@ from swarmscope.onboard.mapping.cells import (
     is_near,
     is_open,
     is_set,
+    is_slim,
     move_fine_layer,
     node_place,
     open_way,
@@ -34,7 +39,7 @@ CELLS = st.integers(-100, 100)
 PLACES = st.floats(-110.0, 110.0)
 
 
-@given(st.sets(st.tuples(CELLS, CELLS), max_size=30), PLACES, PLACES, st.floats(1.0, 7.5))
+@given(st.sets(st.tuples(CELLS, CELLS), max_size=30), PLACES, PLACES, st.floats(2.1, 7.5))
 def test_a_disc_fits_where_no_cells_middle_is_nearer_than_its_radius(cells, u, v, radius):
     memory = map_of(*cells, radius=radius)
     nearest = min((math.hypot(x + 0.5 - u, y + 0.5 - v) for x, y in cells), default=math.inf)
@@ -95,7 +100,7 @@ def test_a_far_hit_blocks_the_nodes_round_it(u, v):
 
 def test_the_farthest_page_makes_room_for_a_new_one():
     memory = map_of()
-    nodes = [(64 * (k % 20), 64 * (k // 20)) for k in range(PAGES + 30)]
+    nodes = [(64 * (k % 15), 64 * (k // 15)) for k in range(PAGES + 30)]
     for kx, ky in nodes:
         block(memory, kx, ky, True, False)
     assert memory["pages_n"] == PAGES
@@ -106,8 +111,8 @@ def test_the_farthest_page_makes_room_for_a_new_one():
 def test_what_lies_a_directory_away_takes_the_same_place():
     memory = map_of()
     block(memory, 5, 5, True, False)
-    block(memory, 5 + 32 * 64, 5, True, False)
-    assert is_blocked(memory, 5 + 32 * 64, 5)
+    block(memory, 5 + DIRECTORY * 64, 5, True, False)
+    assert is_blocked(memory, 5 + DIRECTORY * 64, 5)
     assert not is_blocked(memory, 5, 5)
 
 
@@ -125,8 +130,34 @@ def test_a_gap_that_is_hardly_wider_than_the_robot_lies_beside_a_node():
     memory = map_of(*gap, radius=3.0)
     ok, u, _ = node_place(memory, 0, 0)
     assert ok
-    assert u == 3.0
+    assert u == 2.75
     assert not fits(memory, 2.0, 2.0)
+
+
+def test_what_less_room_would_do_for_is_remembered_where_the_fine_layer_has_left():
+    """Four things 2.9 cells off a node: the disc of 3.2 does not fit there, that of 2.6 does."""
+    memory = map_of((0, -1), (3, -1), (0, 4), (3, 4))
+    draw_discs(memory, 3.2, 2.6)
+    assert (fits(memory, 2.0, 2.0), is_slim(memory, 0, 0)) == (False, False)
+    move_fine_layer(memory, 400, 0)
+    assert is_blocked(memory, 0, 0)
+    assert is_slim(memory, 0, 0)
+    for at in (400, 0):
+        move_fine_layer(memory, at, 0)
+        ask_for(memory, FULL)
+        assert not node_place(memory, 0, 0)[0]
+        ask_for(memory, LESS)
+        assert node_place(memory, 0, 0)[0]
+        ask_for(memory, FULL)
+
+
+def test_a_wall_is_not_slim():
+    memory = map_of(*[(x, y) for x in range(-60, 61) for y in (0, 1)])
+    move_fine_layer(memory, 400, 0)
+    assert all(is_blocked(memory, kx, 0) or is_blocked(memory, kx, -1) for kx in range(-12, 13))
+    ask_for(memory, LESS)
+    for kx in range(-12, 13):
+        assert not open_way(memory, NODE * kx + 2.0, -20.0, NODE * kx + 2.0, 20.0)
 
 
 def test_all_is_forgotten():

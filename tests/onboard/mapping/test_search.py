@@ -8,11 +8,20 @@ import numpy as np
 import pytest
 from drawn_maps import length_of, map_of, over_nodes, ring, way_of
 
-from swarmscope.onboard.mapping.cells import block, is_open, node_place, open_way
+from swarmscope.onboard.mapping.cells import FULL, PHASES, block, is_open, node_place, open_way
 from swarmscope.onboard.mapping.flood import flood
-from swarmscope.onboard.mapping.memory import used_bytes
+from swarmscope.onboard.mapping.kept import keep, review
+from swarmscope.onboard.mapping.memory import KEPT, used_bytes
 from swarmscope.onboard.mapping.search import FOUND, NOT_FOUND, shortest
-from swarmscope.onboard.mapping.way import find_shorter, find_way, forget_and_find, shorten, tighten, way_length
+from swarmscope.onboard.mapping.way import (
+    find_shorter,
+    find_way,
+    forget_and_find,
+    nearest_open,
+    shorten,
+    tighten,
+    way_length,
+)
 from swarmscope.onboard.mapping.words import Spot
 
 START, GOAL = (-60.0, 0.0), (60.0, 1.0)
@@ -97,13 +106,60 @@ def test_a_map_that_closes_everything_is_forgotten_in_the_stated_order():
     memory["stand_n"], memory["stand_u"][0], memory["stand_r"][0] = 1, -30.0, 12.0
     assert forget_and_find(memory, here, goal) == 1
     assert memory["stand_n"] == 1
-    narrow = map_of(*ring(30.0, gap=0.2))
+    narrow = map_of(*ring(30.0, gap=0.17))
     assert forget_and_find(narrow, here, goal) == 2
-    assert narrow["disc_r"] == pytest.approx(3.2)
+    assert (narrow["room"], narrow["disc_r"][FULL]) == (FULL, pytest.approx(3.2))
     shut = map_of(*ring(30.0))
     assert forget_and_find(shut, here, goal) == 3
     assert not shut["fine"].any()
     assert way_of(shut) == [(100.0, 0.0)]
+
+
+def test_a_gap_that_was_too_narrow_is_tried_again_when_nothing_else_is_open():
+    here, goal = Spot(0.0, 0.0), Spot(100.0, 0.0)
+    memory = map_of(*ring(30.0, gap=0.5))
+    keep(memory, Spot(-30.0, 0.0), 8.0, 60.0)
+    assert not find_way(memory, here, goal)
+    assert forget_and_find(memory, here, goal) == 2
+    assert memory["kept_n"] == 1
+    review(memory, 59.0)
+    assert memory["kept_n"] == 1
+    review(memory, 60.0)
+    assert (memory["kept_n"], memory["opened"]) == (0, 1)
+    assert forget_and_find(memory, here, goal) == 0
+
+
+def test_more_gaps_than_can_be_kept_push_out_the_one_that_ends_first():
+    memory = map_of()
+    for k in range(KEPT + 1):
+        keep(memory, Spot(20.0 * k, 0.0), 4.0, 60.0 - k)
+    assert memory["kept_n"] == KEPT
+    assert is_open(memory, 20.0 * (KEPT - 1), 0.0)
+    assert not is_open(memory, 20.0 * KEPT, 0.0)
+    keep(memory, Spot(1.0, 0.0), 4.0, 99.0)
+    assert memory["kept_n"] == KEPT
+    assert memory["kept_s"].max() == 99.0
+
+
+@pytest.mark.parametrize("shift", range(4))
+def test_a_gap_between_the_nodes_is_found_wherever_it_lies(shift):
+    """A hole of 8 cells in a wall across the whole map, for a disc of 6.4: the flood's nodes may miss it."""
+    wall = [(x, y) for x in (40, 41) for y in range(-110, 110) if not shift <= y < shift + 8]
+    memory = map_of(*wall)
+    found = []
+    for phase in range(PHASES):
+        memory["phase"] = phase
+        found.append(bool(flood(memory, 0.0, 0.0, 80.0, 0.0)) and length_of((0.0, 0.0), way_of(memory)) < 100.0)
+    assert any(found)
+
+
+def test_who_is_a_little_beside_where_it_fits_counts_as_being_there():
+    memory = map_of((0, 0))
+    assert nearest_open(memory, Spot(30.0, 0.0), 3) == Spot(30.0, 0.0)
+    there = nearest_open(memory, Spot(2.9, 0.5), 3)
+    assert is_open(memory, there.u, there.v)
+    assert math.dist(there, (2.9, 0.5)) <= 1.0
+    assert nearest_open(memory, Spot(0.5, 0.5), 2) == Spot(0.5, 0.5)
 
 
 def test_a_goal_that_is_not_open_is_gone_to_as_near_as_can_be():

@@ -4,7 +4,7 @@
 asked whether the robot's disc fits at a place, to a quarter of a cell.
 *Place layer*: all that the square has left behind. A bit for each node of a grid four cells wide says whether the disc
 did not fit there, a second one whether a disc with less room did. It is kept in pages of 64 x 64 nodes that are there only where something is; the directory wraps
-round after 32 pages, so that what lies that far away is forgotten when its place is wanted.
+round after 16 pages, so that what lies that far away is forgotten when its place is wanted.
 
 Unknown is free. All places are in cells. ``memory`` is a robot's row of ``MAP`` (``mapping/memory.py``).
 """
@@ -30,8 +30,10 @@ LEAP = 4 * WIDE
 RIM = 2
 """Nodes along the rim of the fine layer that are still asked of the place layer: discs there reach beyond it."""
 PAGES = 127
-"""That there can be at once, a kilobyte each."""
-DIRECTORY = 32
+"""That there can be at once, 512 bytes each."""
+SLIM_PAGES = 64
+"""Of these with a place where less room would do, 512 bytes more each."""
+DIRECTORY = 16
 NO_PAGE = 0
 PAGE_BITS = 6
 QUARTERS = 4
@@ -43,6 +45,8 @@ LEAST_RADIUS = 0.5 * NODE + 0.1
 FULL, LESS, LEAST = range(3)
 """How much room is asked for: what is wanted, what the guard keeps, or what a body takes that just gets through."""
 ROOMS = 3
+DISCS = 2
+"""Drawn at once: the first, and that of the room that was last asked for."""
 PHASES = 4
 HALF_DIAGONAL = math.sqrt(0.5)
 """What stands in a cell may be so far from its middle."""
@@ -105,7 +109,10 @@ def is_blocked(memory: Row, kx: int, ky: int) -> bool:
 def is_slim(memory: Row, kx: int, ky: int) -> bool:
     """Tell whether a disc with less room did fit at node (kx, ky) when the fine layer last left it."""
     slot = page_of(memory, kx, ky)
-    return slot >= 0 and bool((memory["slim"][slot, ky & (WORD - 1)] >> np.uint64(kx & (WORD - 1))) & ONE)
+    if slot < 0 or memory["slim_at"][slot] == NO_PAGE:
+        return False
+    word = memory["slim"][number(memory["slim_at"][slot]) - 1, ky & (WORD - 1)]
+    return bool((word >> np.uint64(kx & (WORD - 1))) & ONE)
 
 
 @jit
@@ -124,7 +131,20 @@ def block(memory: Row, kx: int, ky: int, blocked: bool, slim: bool) -> None:
         slot = _new_page(memory, kx >> PAGE_BITS, ky >> PAGE_BITS)
     row, one = ky & (WORD - 1), bit(kx & (WORD - 1))
     memory["rows"][slot, row] = memory["rows"][slot, row] | one if blocked else memory["rows"][slot, row] & ~one
-    memory["slim"][slot, row] = memory["slim"][slot, row] | one if slim else memory["slim"][slot, row] & ~one
+    at = number(memory["slim_at"][slot]) - 1
+    if slim and at < 0 and memory["slims_n"] < SLIM_PAGES:
+        at = memory["slims_n"]
+        memory["slims_n"] += 1
+        memory["slim_at"][slot] = at + 1
+        _empty_slim(memory, at)
+    if at >= 0:
+        memory["slim"][at, row] = memory["slim"][at, row] | one if slim else memory["slim"][at, row] & ~one
+
+
+@jit_inner
+def _empty_slim(memory: Row, at: int) -> None:
+    for k in range(WORD):
+        memory["slim"][at, k] = ZERO
 
 
 @jit_inner
@@ -145,7 +165,9 @@ def _new_page(memory: Row, px: int, py: int) -> int:
     memory["page_at"][at_y, at_x] = slot + 1
     memory["page_x"][slot], memory["page_y"][slot] = px, py
     for k in range(WORD):
-        memory["rows"][slot, k] = memory["slim"][slot, k] = ZERO
+        memory["rows"][slot, k] = ZERO
+    if memory["slim_at"][slot] != NO_PAGE:
+        _empty_slim(memory, number(memory["slim_at"][slot]) - 1)
     return slot
 
 
@@ -155,7 +177,9 @@ def forget_all(memory: Row) -> None:
     for y in range(DIRECTORY):
         for x in range(DIRECTORY):
             memory["page_at"][y, x] = NO_PAGE
-    memory["pages_n"] = 0
+    for k in range(PAGES):
+        memory["slim_at"][k] = NO_PAGE
+    memory["pages_n"] = memory["slims_n"] = 0
     _empty_fine_layer(memory)
 
 
@@ -195,9 +219,9 @@ def _shift(memory: Row, ex: int, ey: int) -> None:
     for k in range(RIM, NODES - RIM):
         kx, ky = (x0 + out, y0 + k) if ex != 0 else (x0 + k, y0 + out)
         fits_here = _any_fits(memory, kx, ky)
-        memory["room"] = LESS
+        ask_for(memory, LESS)
         block(memory, kx, ky, not fits_here, not fits_here and _any_fits(memory, kx, ky))
-        memory["room"] = FULL
+        ask_for(memory, FULL)
     first = 0 if ex + ey > 0 else NODES - 1  # the line that leaves the layer
     for k in range(NODES):
         kx, ky = (x0 + first, y0 + k) if ex != 0 else (x0 + k, y0 + first)
@@ -249,14 +273,24 @@ def draw_discs(memory: Row, full: float, less: float) -> None:
     memory["disc_r"][FULL], memory["disc_r"][LESS] = full, less
     memory["disc_r"][LEAST] = max(LEAST_RADIUS, less - HALF_DIAGONAL)
     memory["disc_half"] = min(DISC_ROWS // 2, int(math.ceil(full)))
-    for room in range(ROOMS):
-        _draw_disc(memory, room, memory["disc_r"][room])
+    _draw_disc(memory, FULL)
+    _draw_disc(memory, LESS)
+
+
+@jit
+def ask_for(memory: Row, room: int) -> None:
+    """Ask for so much room from now on."""
+    memory["room"] = room
+    if room != FULL and memory["disc_of"] != room:
+        _draw_disc(memory, room)
 
 
 @jit_inner
-def _draw_disc(memory: Row, room: int, radius: float) -> None:
+def _draw_disc(memory: Row, room: int) -> None:
     """Draw a disc: the cells whose middle it holds, for a centre in each quarter of a cell."""
-    half = memory["disc_half"]
+    half, radius, at = memory["disc_half"], memory["disc_r"][room], min(room, 1)
+    if at > 0:
+        memory["disc_of"] = room
     for qy in range(QUARTERS):
         for qx in range(QUARTERS):
             cx, cy = (qx + 0.5) / QUARTERS, (qy + 0.5) / QUARTERS
@@ -266,7 +300,7 @@ def _draw_disc(memory: Row, room: int, radius: float) -> None:
                     ex, ey = i - half + 0.5 - cx, j - half + 0.5 - cy
                     if ex * ex + ey * ey < radius * radius:
                         row |= bit(i)
-                memory["disc"][room, qy, qx, j] = row
+                memory["disc"][at, qy, qx, j] = row
 
 
 @jit_inline
@@ -275,7 +309,7 @@ def _disc_fits(memory: Row, u: float, v: float) -> bool:
     ix, iy = int(math.floor(u)), int(math.floor(v))
     half = memory["disc_half"]
     x0, y0 = ix - half, iy - half
-    qx, qy, room = int(QUARTERS * (u - ix)), int(QUARTERS * (v - iy)), memory["room"]
+    qx, qy, room = int(QUARTERS * (u - ix)), int(QUARTERS * (v - iy)), 0 if memory["room"] == FULL else 1
     shift = x0 & (WORD - 1)
     word = (x0 >> PAGE_BITS) & (WIDE_WORDS - 1)
     if shift + 2 * half < WORD:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from swarmscope._jit import jit, jit_inline, jit_inner
-from swarmscope.onboard.mapping.cells import FULL, NODE, NODES, PAGE_BITS, RIM, WIDE, node_place, open_way
+from swarmscope.onboard.mapping.cells import FULL, NO_PAGE, NODE, NODES, PAGE_BITS, RIM, WIDE, node_place, open_way
 from swarmscope.onboard.mapping.memory import CORNERS
 from swarmscope.onboard.mapping.words import ONE, WORD, ZERO, Spot, bit, number
 from swarmscope.onboard.percept import Row
@@ -101,8 +101,8 @@ def _block(memory: Row, frame: Frame) -> None:
         if 0 <= w < frame.words and 0 <= y0 < frame.height:
             for y in range(WORD):
                 blocked = memory["rows"][k, y]
-                if memory["room"] != FULL:
-                    blocked &= ~memory["slim"][k, y]
+                if memory["room"] != FULL and memory["slim_at"][k] != NO_PAGE:
+                    blocked &= ~memory["slim"][number(memory["slim_at"][k]) - 1, y]
                 for plane in range(3):
                     scratch[_at(frame, plane, y0 + y, w)] = blocked
     x0, y0 = memory["west"] // NODE - frame.ox, memory["south"] // NODE - frame.oy

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from swarmscope.onboard.mapping.cells import DIRECTORY, DISC_ROWS, PAGES, QUARTERS, ROOMS, WIDE, WIDE_WORDS
+from swarmscope.onboard.mapping.cells import DIRECTORY, DISC_ROWS, DISCS, PAGES, QUARTERS, ROOMS, SLIM_PAGES, WIDE, WIDE_WORDS
 from swarmscope.onboard.mapping.words import WORD
 from swarmscope.onboard.percept import NEVER_S, PEERS, Row
 
@@ -12,7 +12,7 @@ NEAR = 64
 """Cells on a side of the square round the robot in which it is known how sure each cell is."""
 GONE = 32
 """Cells that are known to have been cleared."""
-KEPT = 16
+KEPT = 8
 """Places that are kept closed at once."""
 CORNERS = 64
 """Of a way, the goal included."""
@@ -30,10 +30,13 @@ MAP = np.dtype(
         ("page_y", np.int16, PAGES),
         ("pages_n", np.int64),
         ("rows", np.uint64, (PAGES, WORD)),
-        ("slim", np.uint64, (PAGES, WORD)),  # nodes that are blocked, but less room would do
+        ("slim_at", np.uint8, PAGES),  # 1 + where what follows has a page's nodes, 0 = none of them are
+        ("slim", np.uint64, (SLIM_PAGES, WORD)),  # nodes that are blocked, but less room would do
+        ("slims_n", np.int64),
         ("room", np.uint8),  # how much room is asked for now
         ("phase", np.int64),  # how the fine layer's nodes are moved now
-        ("disc", np.uint32, (ROOMS, QUARTERS, QUARTERS, DISC_ROWS)),  # what must be free round a robot
+        ("disc", np.uint32, (DISCS, QUARTERS, QUARTERS, DISC_ROWS)),  # what must be free round a robot
+        ("disc_of", np.uint8),  # for how much room the second one is
         ("disc_half", np.int64),  # rows that it has on either side of its middle, 0 = not yet drawn
         ("disc_r", np.float64, ROOMS),  # its radius [cells]
         # how sure: 0 to 15, and in the upper four bits how often the cell has come back
@@ -91,7 +94,7 @@ MAP = np.dtype(
 )
 
 
-PER_PAGE = ("rows", "slim", "page_x", "page_y")
+PER_PAGE = ("rows", "page_x", "page_y")
 
 
 def new_memory(robots: int) -> np.ndarray:
@@ -103,9 +106,12 @@ def new_memory(robots: int) -> np.ndarray:
 
 
 def used_bytes(memory: Row) -> int:
-    """Return how much of its memory a robot has used: pages and scratch as far as they were wanted, all else whole."""
+    """Return how much of its memory a robot has used: pages, scratch and discs as far as they were wanted."""
     sizes = {name: MAP[name].itemsize for name in MAP.names or ()}
     of_pages = sum(sizes[name] // PAGES for name in PER_PAGE)
-    of_scratch = sizes["scratch"] // SCRATCH
-    whole = sum(size for name, size in sizes.items() if name not in (*PER_PAGE, "scratch"))
-    return int(whole + of_pages * memory["pages_n"] + of_scratch * memory["scratch_n"])
+    unused_rows = 1.0 - (2 * memory["disc_half"] + 1) / DISC_ROWS
+    of_slims, of_scratch = sizes["slim"] // SLIM_PAGES, sizes["scratch"] // SCRATCH
+    whole = sum(size for name, size in sizes.items() if name not in (*PER_PAGE, "slim", "scratch"))
+    whole -= sizes["disc"] * unused_rows
+    wanted = of_pages * memory["pages_n"] + of_slims * memory["slims_n"] + of_scratch * memory["scratch_n"]
+    return int(whole + wanted)

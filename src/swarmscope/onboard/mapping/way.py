@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from swarmscope._jit import jit, jit_inline, jit_inner
-from swarmscope.onboard.mapping.cells import FULL, LEAST, LESS, PHASES, forget_all, is_open, open_way
+from swarmscope.onboard.mapping.cells import FULL, LEAST, LESS, PHASES, ask_for, forget_all, is_open, open_way
 from swarmscope.onboard.mapping.flood import flood
 from swarmscope.onboard.mapping.memory import CORNERS
 from swarmscope.onboard.mapping.search import FOUND, TOO_MANY, shortest
@@ -218,9 +218,9 @@ def forget_and_find(memory: Row, here: Spot, goal: Spot) -> int:
         if step == NOBODY:
             memory["stand_n"] = 0
         elif step == LESS_ROOM:
-            memory["room"] = LESS
+            ask_for(memory, LESS)
         elif step == LEAST_ROOM:
-            memory["room"] = LEAST
+            ask_for(memory, LEAST)
         elif step == AGAIN:
             memory["kept_n"] = 0
         elif step == NOTHING:

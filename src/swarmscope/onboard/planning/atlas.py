@@ -18,12 +18,12 @@ from swarmscope.onboard.control.wanting import halt, head_for
 from swarmscope.onboard.deciding.evading import Evading, comes, evade, keep_right
 from swarmscope.onboard.deciding.following import away_from_nearest
 from swarmscope.onboard.deciding.progress import last_speed
-from swarmscope.onboard.mapping.cells import FULL, draw_discs, open_way
+from swarmscope.onboard.mapping.cells import FULL, ask_for, draw_discs, open_way
 from swarmscope.onboard.mapping.evidence import learn
 from swarmscope.onboard.mapping.kept import keep, review
 from swarmscope.onboard.mapping.memory import MAP, new_memory
 from swarmscope.onboard.mapping.way import START_WITHIN, find_shorter, forget_and_find, nearest_open, shorten
-from swarmscope.onboard.mapping.words import Spot
+from swarmscope.onboard.mapping.words import Spot, number
 from swarmscope.onboard.percept import PEERS, Row
 from swarmscope.onboard.perception.corridor import corridor_length
 from swarmscope.onboard.perception.safety import safe_directions
@@ -161,7 +161,7 @@ def _keep_way(see: View, memory: Row, params: Params, here: Spot, goal: Spot) ->
     now, n, forgot = see.percept["now_s"], memory["way_n"], 0
     if n > 0:
         memory["way_u"][n - 1], memory["way_v"][n - 1] = goal.u, goal.v
-    memory["room"] = memory["way_room"]
+    ask_for(memory, number(memory["way_room"]))
     here = nearest_open(memory, here, START_WITHIN)
     shorten(memory, here)
     in_sight = memory["way_n"] > 0 and open_way(memory, here.u, here.v, memory["way_u"][0], memory["way_v"][0])
