@@ -92,7 +92,7 @@ def make_trips(
         if chosen.ways == "two":
             back = np.arange(robots) % 2 == 1
             starts[back], goals[back] = goals[back].copy(), starts[back].copy()
-    start_s = None if chosen.depart == "at_once" else np.arange(robots) * chosen.every_s
+    start_s = None if chosen.depart == "at_once" else chosen.every_s * np.arange(robots, dtype=np.float64)
     return starts, goals, start_s
 
 

@@ -11,29 +11,25 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmscope.onboard.mapping.cells import (
-    DIRECTORY,
     FULL,
     LESS,
     NODE,
-    PAGES,
     WIDE,
     ask_for,
-    block,
     block_round,
     clear_cell,
     draw_discs,
     fits,
     forget_all,
-    is_blocked,
     is_near,
     is_open,
     is_set,
-    is_slim,
     move_fine_layer,
     node_place,
     open_way,
     set_cell,
 )
+from swarmscope.onboard.mapping.pages import DIRECTORY, PAGES, block, is_blocked, is_slim
 
 CELLS = st.integers(-100, 100)
 PLACES = st.floats(-110.0, 110.0)

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from drawn_maps import length_of, map_of, over_nodes, ring, way_of
 
-from swarmscope.onboard.mapping.cells import FULL, PHASES, block, is_open, node_place, open_way
+from swarmscope.onboard.mapping.cells import FULL, PHASES, is_open, node_place, open_way
 from swarmscope.onboard.mapping.flood import flood
 from swarmscope.onboard.mapping.kept import keep, review
 from swarmscope.onboard.mapping.memory import KEPT, used_bytes
+from swarmscope.onboard.mapping.pages import block
 from swarmscope.onboard.mapping.search import FOUND, NOT_FOUND, shortest
 from swarmscope.onboard.mapping.way import (
     find_shorter,

@@ -3,8 +3,9 @@
 *Fine layer*: cells of ``cell_m``, a bit each, in a square of 256 x 256 cells that moves with the robot. Of these it is
 asked whether the robot's disc fits at a place, to a quarter of a cell.
 *Place layer*: all that the square has left behind. A bit for each node of a grid four cells wide says whether the disc
-did not fit there, a second one whether a disc with less room did. It is kept in pages of 64 x 64 nodes that are there only where something is; the directory wraps
-round after 16 pages, so that what lies that far away is forgotten when its place is wanted.
+did not fit there, a second one whether a disc with less room did. It is kept in pages of 64 x 64 nodes that are there
+only where something is; the directory wraps round after 16 pages, so that what lies that far away is forgotten when its
+place is wanted.
 
 Unknown is free. All places are in cells. ``memory`` is a robot's row of ``MAP`` (``mapping/memory.py``).
 """
@@ -16,7 +17,8 @@ import math
 import numpy as np
 
 from swarmscope._jit import jit, jit_inline, jit_inner
-from swarmscope.onboard.mapping.words import ONE, WORD, ZERO, bit, number, window
+from swarmscope.onboard.mapping.pages import PAGE_BITS, block, forget_pages, is_blocked, is_slim
+from swarmscope.onboard.mapping.words import ONE, WORD, ZERO, bit, window
 from swarmscope.onboard.percept import Row
 
 WIDE = 256
@@ -29,13 +31,6 @@ LEAP = 4 * WIDE
 """Who is suddenly so many cells from where it was begins a new fine layer: its odometry has failed."""
 RIM = 2
 """Nodes along the rim of the fine layer that are still asked of the place layer: discs there reach beyond it."""
-PAGES = 127
-"""That there can be at once, 512 bytes each."""
-SLIM_PAGES = 64
-"""Of these with a place where less room would do, 512 bytes more each."""
-DIRECTORY = 16
-NO_PAGE = 0
-PAGE_BITS = 6
 QUARTERS = 4
 """Discs are drawn for places to a quarter of a cell."""
 STRIDE = 2.0
@@ -88,33 +83,6 @@ def clear_cell(memory: Row, ix: int, iy: int) -> None:
     memory["fine"][iy & (WIDE - 1), (ix >> PAGE_BITS) & (WIDE_WORDS - 1)] &= ~bit(ix & (WORD - 1))
 
 
-@jit_inline
-def page_of(memory: Row, kx: int, ky: int) -> int:
-    """Return the slot of the page that node (kx, ky) lies in, -1: there is none, all of it is free."""
-    px, py = kx >> PAGE_BITS, ky >> PAGE_BITS
-    slot = number(memory["page_at"][py & (DIRECTORY - 1), px & (DIRECTORY - 1)]) - 1
-    if slot >= 0 and (memory["page_x"][slot] != px or memory["page_y"][slot] != py):
-        return -1
-    return slot
-
-
-@jit_inline
-def is_blocked(memory: Row, kx: int, ky: int) -> bool:
-    """Tell whether the place layer has node (kx, ky) blocked."""
-    slot = page_of(memory, kx, ky)
-    return slot >= 0 and bool((memory["rows"][slot, ky & (WORD - 1)] >> np.uint64(kx & (WORD - 1))) & ONE)
-
-
-@jit
-def is_slim(memory: Row, kx: int, ky: int) -> bool:
-    """Tell whether a disc with less room did fit at node (kx, ky) when the fine layer last left it."""
-    slot = page_of(memory, kx, ky)
-    if slot < 0 or memory["slim_at"][slot] == NO_PAGE:
-        return False
-    word = memory["slim"][number(memory["slim_at"][slot]) - 1, ky & (WORD - 1)]
-    return bool((word >> np.uint64(kx & (WORD - 1))) & ONE)
-
-
 @jit
 def is_shut(memory: Row, kx: int, ky: int) -> bool:
     """Tell whether node (kx, ky) of the place layer is closed to a robot that asks for as much room as it does now."""
@@ -122,64 +90,9 @@ def is_shut(memory: Row, kx: int, ky: int) -> bool:
 
 
 @jit
-def block(memory: Row, kx: int, ky: int, blocked: bool, slim: bool) -> None:
-    """Write into the place layer whether node (kx, ky) is blocked, and whether less room would do there."""
-    slot = page_of(memory, kx, ky)
-    if slot < 0:
-        if not blocked:
-            return
-        slot = _new_page(memory, kx >> PAGE_BITS, ky >> PAGE_BITS)
-    row, one = ky & (WORD - 1), bit(kx & (WORD - 1))
-    memory["rows"][slot, row] = memory["rows"][slot, row] | one if blocked else memory["rows"][slot, row] & ~one
-    at = number(memory["slim_at"][slot]) - 1
-    if slim and at < 0 and memory["slims_n"] < SLIM_PAGES:
-        at = memory["slims_n"]
-        memory["slims_n"] += 1
-        memory["slim_at"][slot] = at + 1
-        _empty_slim(memory, at)
-    if at >= 0:
-        memory["slim"][at, row] = memory["slim"][at, row] | one if slim else memory["slim"][at, row] & ~one
-
-
-@jit_inner
-def _empty_slim(memory: Row, at: int) -> None:
-    for k in range(WORD):
-        memory["slim"][at, k] = ZERO
-
-
-@jit_inner
-def _new_page(memory: Row, px: int, py: int) -> int:
-    """Return the slot of a new, empty page: a free one, else that of the page farthest from this one."""
-    at_y, at_x = py & (DIRECTORY - 1), px & (DIRECTORY - 1)
-    slot = number(memory["page_at"][at_y, at_x]) - 1
-    if slot < 0 and memory["pages_n"] < PAGES:
-        slot = memory["pages_n"]
-        memory["pages_n"] += 1
-    elif slot < 0:
-        slot, farthest = 0, -1
-        for k in range(PAGES):
-            d = (memory["page_x"][k] - px) ** 2 + (memory["page_y"][k] - py) ** 2
-            if d > farthest:
-                slot, farthest = k, d
-        memory["page_at"][memory["page_y"][slot] & (DIRECTORY - 1), memory["page_x"][slot] & (DIRECTORY - 1)] = NO_PAGE
-    memory["page_at"][at_y, at_x] = slot + 1
-    memory["page_x"][slot], memory["page_y"][slot] = px, py
-    for k in range(WORD):
-        memory["rows"][slot, k] = ZERO
-    if memory["slim_at"][slot] != NO_PAGE:
-        _empty_slim(memory, number(memory["slim_at"][slot]) - 1)
-    return slot
-
-
-@jit
 def forget_all(memory: Row) -> None:
     """Forget everything."""
-    for y in range(DIRECTORY):
-        for x in range(DIRECTORY):
-            memory["page_at"][y, x] = NO_PAGE
-    for k in range(PAGES):
-        memory["slim_at"][k] = NO_PAGE
-    memory["pages_n"] = memory["slims_n"] = 0
+    forget_pages(memory)
     _empty_fine_layer(memory)
 
 
@@ -241,7 +154,8 @@ def _shift(memory: Row, ex: int, ey: int) -> None:
 @jit_inner
 def _beside(memory: Row) -> float:
     """Return how far from a node a robot that is at it may be [cells]; of two either side of a wall one stays shut."""
-    return min(1.0, math.floor(QUARTERS * (memory["disc_r"][memory["room"]] - LEAST_RADIUS)) / QUARTERS)
+    spare: float = memory["disc_r"][memory["room"]] - LEAST_RADIUS
+    return min(1.0, math.floor(QUARTERS * spare) / QUARTERS)
 
 
 @jit_inner
@@ -381,8 +295,8 @@ def is_open(memory: Row, u: float, v: float) -> bool:
 def node_place(memory: Row, kx: int, ky: int) -> tuple[bool, float, float]:
     """Return whether the robot may be at node (kx, ky) or a cell beside it, and where.
 
-    A gap that is hardly wider than the robot lies between the nodes more often than not. The nodes of the fine layer may
-    be moved on by half of the way to the next (``phase`` 1 to 3): then they lie where gaps were missed.
+    A gap that is hardly wider than the robot lies between the nodes more often than not. The nodes of the fine layer
+    may be moved on by half of the way to the next (``phase`` 1 to 3): then they lie where gaps were missed.
     """
     u, v = float(NODE * kx + 2), float(NODE * ky + 2)
     if is_fine(memory, u, v):

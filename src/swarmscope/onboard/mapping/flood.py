@@ -13,8 +13,9 @@ from typing import NamedTuple
 import numpy as np
 
 from swarmscope._jit import jit, jit_inline, jit_inner
-from swarmscope.onboard.mapping.cells import FULL, NO_PAGE, NODE, NODES, PAGE_BITS, RIM, WIDE, node_place, open_way
+from swarmscope.onboard.mapping.cells import FULL, NODE, NODES, RIM, WIDE, node_place, open_way
 from swarmscope.onboard.mapping.memory import CORNERS
+from swarmscope.onboard.mapping.pages import NO_PAGE, PAGE_BITS
 from swarmscope.onboard.mapping.words import ONE, WORD, ZERO, Spot, bit, number
 from swarmscope.onboard.percept import Row
 
@@ -96,15 +97,7 @@ def _block(memory: Row, frame: Frame) -> None:
     scratch = memory["scratch"]
     for k in range(2 * ROWS_ON + 3 * frame.words * frame.height):
         scratch[k] = ZERO
-    for k in range(memory["pages_n"]):
-        w, y0 = memory["page_x"][k] - (frame.ox >> PAGE_BITS), memory["page_y"][k] * WORD - frame.oy
-        if 0 <= w < frame.words and 0 <= y0 < frame.height:
-            for y in range(WORD):
-                blocked = memory["rows"][k, y]
-                if memory["room"] != FULL and memory["slim_at"][k] != NO_PAGE:
-                    blocked &= ~memory["slim"][number(memory["slim_at"][k]) - 1, y]
-                for plane in range(3):
-                    scratch[_at(frame, plane, y0 + y, w)] = blocked
+    _block_pages(memory, frame)
     x0, y0 = memory["west"] // NODE - frame.ox, memory["south"] // NODE - frame.oy
     for y in range(max(0, y0 + RIM), min(frame.height, y0 + NODES - RIM)):
         for x in range(max(0, x0 + RIM), min(frame.words * WORD, x0 + NODES - RIM)):
@@ -119,6 +112,20 @@ def _block(memory: Row, frame: Frame) -> None:
         _close_round(memory, frame, memory["stand_u"][k], memory["stand_v"][k], memory["stand_r"][k])
     for k in range(memory["kept_n"]):
         _close_round(memory, frame, memory["kept_u"][k], memory["kept_v"][k], memory["kept_r"][k])
+
+
+@jit_inner
+def _block_pages(memory: Row, frame: Frame) -> None:
+    """Take over what the place layer has blocked, but for where less room would do if that is asked for."""
+    for k in range(memory["pages_n"]):
+        w, y0 = memory["page_x"][k] - (frame.ox >> PAGE_BITS), memory["page_y"][k] * WORD - frame.oy
+        if 0 <= w < frame.words and 0 <= y0 < frame.height:
+            for y in range(WORD):
+                blocked = memory["rows"][k, y]
+                if memory["room"] != FULL and memory["slim_at"][k] != NO_PAGE:
+                    blocked &= ~memory["slim"][number(memory["slim_at"][k]) - 1, y]
+                for plane in range(3):
+                    memory["scratch"][_at(frame, plane, y0 + y, w)] = blocked
 
 
 @jit_inner

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from swarmscope.onboard.mapping.cells import DIRECTORY, DISC_ROWS, DISCS, PAGES, QUARTERS, ROOMS, SLIM_PAGES, WIDE, WIDE_WORDS
+from swarmscope.onboard.mapping.cells import DISC_ROWS, DISCS, QUARTERS, ROOMS, WIDE, WIDE_WORDS
+from swarmscope.onboard.mapping.pages import DIRECTORY, PAGES, SLIM_PAGES
 from swarmscope.onboard.mapping.words import WORD
 from swarmscope.onboard.percept import NEVER_S, PEERS, Row
 
@@ -67,6 +68,8 @@ MAP = np.dtype(
         ("way_v", np.float64, CORNERS),
         ("way_n", np.int64),  # 0 = there is none
         ("way_room", np.uint8),  # how much room it leaves
+        ("leg_u", np.float64),  # from where its first corner was last in sight [cells]
+        ("leg_v", np.float64),
         ("old_u", np.float32, CORNERS),  # the way before the last search
         ("old_v", np.float32, CORNERS),
         ("other_u", np.float32, CORNERS),  # the way that another search has found

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from swarmscope._jit import jit, jit_inline, jit_inner
+from swarmscope.geometry import point_segment_distance
 from swarmscope.onboard.mapping.cells import FULL, LEAST, LESS, PHASES, ask_for, forget_all, is_open, open_way
 from swarmscope.onboard.mapping.flood import flood
 from swarmscope.onboard.mapping.memory import CORNERS
@@ -16,7 +17,9 @@ from swarmscope.onboard.percept import Row
 
 HALVINGS = 4
 SWEEPS = 2
-REACHED = 0.5
+BESIDE_LEG = 3.0
+"""So far beside a leg of its way [cells] a robot is still on it."""
+REACHED = 1.0
 """A corner so near [cells] is behind."""
 LONG = 1.15
 """Times the straight line: a way that is longer is compared with what a flood finds."""
@@ -147,7 +150,23 @@ def shorten(memory: Row, here: Spot) -> None:
         (memory["way_u"][0] - here.u) ** 2 + (memory["way_v"][0] - here.v) ** 2 < REACHED * REACHED
         or open_way(memory, here.u, here.v, memory["way_u"][1], memory["way_v"][1])
     ):
+        memory["leg_u"], memory["leg_v"] = memory["way_u"][0], memory["way_v"][0]
         drop_corner(memory, 0)
+
+
+@jit
+def is_on_way(memory: Row, here: Spot) -> bool:
+    """Tell whether the way's first corner is in sight, or the robot but a little beside a leg to it that is open.
+
+    In a gap that is hardly wide enough the next corner is in sight from one line only; who leaves that by two
+    centimetres and goes back to it does so for ever.
+    """
+    u, v = memory["way_u"][0], memory["way_v"][0]
+    if open_way(memory, here.u, here.v, u, v):
+        memory["leg_u"], memory["leg_v"] = here.u, here.v
+        return True
+    off = point_segment_distance(here.u, here.v, memory["leg_u"], memory["leg_v"], u, v)
+    return bool(off < BESIDE_LEG and open_way(memory, memory["leg_u"], memory["leg_v"], u, v))
 
 
 @jit_inline

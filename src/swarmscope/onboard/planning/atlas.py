@@ -18,11 +18,11 @@ from swarmscope.onboard.control.wanting import halt, head_for
 from swarmscope.onboard.deciding.evading import Evading, comes, evade, keep_right
 from swarmscope.onboard.deciding.following import away_from_nearest
 from swarmscope.onboard.deciding.progress import last_speed
-from swarmscope.onboard.mapping.cells import FULL, ask_for, draw_discs, open_way
+from swarmscope.onboard.mapping.cells import FULL, ask_for, draw_discs
 from swarmscope.onboard.mapping.evidence import learn
 from swarmscope.onboard.mapping.kept import keep, review
 from swarmscope.onboard.mapping.memory import MAP, new_memory
-from swarmscope.onboard.mapping.way import START_WITHIN, find_shorter, forget_and_find, nearest_open, shorten
+from swarmscope.onboard.mapping.way import START_WITHIN, find_shorter, forget_and_find, is_on_way, nearest_open, shorten
 from swarmscope.onboard.mapping.words import Spot, number
 from swarmscope.onboard.percept import PEERS, Row
 from swarmscope.onboard.perception.corridor import corridor_length
@@ -164,7 +164,7 @@ def _keep_way(see: View, memory: Row, params: Params, here: Spot, goal: Spot) ->
     ask_for(memory, number(memory["way_room"]))
     here = nearest_open(memory, here, START_WITHIN)
     shorten(memory, here)
-    in_sight = memory["way_n"] > 0 and open_way(memory, here.u, here.v, memory["way_u"][0], memory["way_v"][0])
+    on_way = memory["way_n"] > 0 and is_on_way(memory, here)
     memory["room"] = FULL
     due = now - memory["searched_s"] >= params.again_s
     if memory["way_n"] == 0 or memory["closed"]:
@@ -173,7 +173,7 @@ def _keep_way(see: View, memory: Row, params: Params, here: Spot, goal: Spot) ->
             memory["searched_s"], memory["opened"] = now, 0
             forgot = forget_and_find(memory, here, goal)
             memory["failed"] = forgot > 0
-    elif due and (memory["opened"] or not in_sight):
+    elif due and (memory["opened"] or not on_way):
         memory["searched_s"], memory["opened"] = now, 0
         find_shorter(memory, here, goal, params.gain_m / params.cell_m)
     if memory["way_n"] == 0:
