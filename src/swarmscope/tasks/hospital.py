@@ -36,10 +36,10 @@ class HospitalOptions(TripOptions):
 
     ways: Ways = "any"
     columns: Amount = 10.0  # of rooms, more for many robots
-    rows: Amount = 7.0
+    rows: Amount = 7.0  # of rooms, more for many robots
     room_m: Length = 4.0  # side of a room
     wall_m: Length = 0.2  # thickness of the walls
-    door_m: Length = 1.0
+    door_m: Length = 1.0  # width of a door
     more_doors: Share = 0.15  # of the walls that need no door
     wide: Share = 0.25  # of the doors: those as wide as the room
     swinging: Share = 0.0  # of the other doors: those that open and close

@@ -35,7 +35,7 @@ class MazeOptions(TripOptions):
 
     ways: Ways = "any"
     columns: Amount = 33.0  # of cells, more for many robots
-    rows: Amount = 30.0
+    rows: Amount = 30.0  # of cells, more for many robots
     cell_m: Length = 1.5  # side of a cell
     closed: Share = 0.25  # of the corridors between two crossings that may be closed
     cleared: Share = 0.1  # of the blocks: those that are open floor

@@ -31,7 +31,7 @@ class WarehouseOptions(TripOptions):
     """Sizes [m] and shares."""
 
     aisles: Amount = 12.0  # of a block, more for many robots
-    blocks: Amount = 2.0
+    blocks: Amount = 2.0  # of aisles, one behind the other
     aisle_m: Length = 1.6  # width of an aisle
     depth_m: Length = 10.0  # length of an aisle
     rack_m: Length = 0.9  # width of a rack

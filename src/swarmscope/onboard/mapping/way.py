@@ -78,10 +78,23 @@ def _search(memory: Row, here: Spot, goal: Spot) -> bool:
             memory["phase"] = phase
             memory["floods"] += 1
             reached = flood(memory, here.u, here.v, goal.u, goal.v)
+            if reached:
+                tighten(memory, here.u, here.v)
+            if phase > 0:
+                reached = reached and _is_all_open(memory, here)
     memory["phase"] = 0
-    if reached:
-        tighten(memory, here.u, here.v)
     return reached
+
+
+@jit_inner
+def _is_all_open(memory: Row, here: Spot) -> bool:
+    """Tell whether every leg of the way is open: two nodes either side of a gap may be where it is too narrow."""
+    u, v = here.u, here.v
+    for k in range(memory["way_n"]):
+        if not open_way(memory, u, v, memory["way_u"][k], memory["way_v"][k]):
+            return False
+        u, v = memory["way_u"][k], memory["way_v"][k]
+    return True
 
 
 @jit_inline
