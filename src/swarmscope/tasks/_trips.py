@@ -13,10 +13,12 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import minimum_spanning_tree
 
 from swarmscope.bounds import Seconds
 from swarmscope.errors import ConfigError
-from swarmscope.sim.world import Obstacle, WorldSpec
+from swarmscope.sim.world import Circle, Obstacle, WorldSpec
 from swarmscope.tasks._contract import Length, Setup
 from swarmscope.tasks._forest import smallest_spacing, yaw_toward
 from swarmscope.tasks._rooms import ASIDE_M, WALL_M, Box, closed_room
@@ -25,6 +27,7 @@ QUEUE_M = 0.6
 """Between the places of a queue."""
 BESIDE_M = 0.2
 """Between a robot in a queue and the wall."""
+WALKER_M, WALKER_MPS = 0.25, (0.3, 0.6)
 EDGE_M = 0.5
 """Drawn beyond the outermost wall."""
 
@@ -82,8 +85,7 @@ def make_trips(
 ) -> tuple[Floats, Floats, Floats | None]:
     """Return starts and goals (N, 2) [m], and when each robot sets out (N,) [s], None for at once."""
     if chosen.depart == "convoy":
-        places = [_row(hall, robots, radius, out) for hall, out in ((floor.left, 0), (floor.right, 2))]
-        starts, goals = places
+        starts, goals = (_row(hall, robots, radius, outer) for hall, outer in ((floor.left, 0), (floor.right, 2)))
     elif chosen.ways == "any":
         starts, goals = _anywhere(rng, floor, robots, radius, chosen.far_m)
     else:
@@ -128,6 +130,20 @@ def _anywhere(
         one = int(rng.choice(far))
         goals[robot], taken[one] = places[one], True
     return starts, goals
+
+
+def on_random_tree(rng: np.random.Generator, ends: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Return which of the edges (E, 2) between nodes, numbered from 0, are those of a random spanning tree (E,)."""
+    order = 1.0 + rng.permutation(len(ends))
+    size = int(ends.max()) + 1
+    tree = minimum_spanning_tree(coo_array((order, (ends[:, 0], ends[:, 1])), shape=(size, size)))
+    return np.isin(order, tree.data)
+
+
+def walker(rng: np.random.Generator, begin: tuple[float, float], end: tuple[float, float]) -> Circle:
+    """Return a disc that walks to and fro between two places [m]."""
+    speed = float(rng.uniform(*WALKER_MPS))
+    return Circle(center=begin, radius=WALKER_M, way=[end], speed_mps=speed)
 
 
 def setup_on(floor: Floor, starts: Floats, goals: Floats, start_s: Floats | None) -> Setup:

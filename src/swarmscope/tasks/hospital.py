@@ -7,15 +7,23 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import minimum_spanning_tree
 
 from swarmscope.bounds import Share
-from swarmscope.sim.world import Circle, Door, Obstacle
+from swarmscope.sim.world import Door, Obstacle
 from swarmscope.tasks._check import check_setup
 from swarmscope.tasks._contract import Amount, Length, Option, Setup, check_robots, read_options
 from swarmscope.tasks._rooms import Box, box
-from swarmscope.tasks._trips import Floor, TripOptions, Ways, hall_width, make_trips, setup_on
+from swarmscope.tasks._trips import (
+    WALKER_M,
+    Floor,
+    TripOptions,
+    Ways,
+    hall_width,
+    make_trips,
+    on_random_tree,
+    setup_on,
+    walker,
+)
 
 NAME = "hospital"
 SUMMARY = "rooms behind rooms, joined by doors on a random tree and by a few more"
@@ -27,7 +35,6 @@ JAMB_M = 0.3
 """From a door to the corner of its room, at least."""
 OPEN_S, CYCLE_S = (15.0, 30.0), (40.0, 60.0)
 """How long a door that opens and closes stays open, and after how long it begins anew."""
-WALKER_M, WALKER_MPS = 0.25, (0.3, 0.6)
 
 
 @dataclass(frozen=True)
@@ -102,11 +109,8 @@ def _gaps(rng: np.random.Generator, columns: int, rows: int, chosen: HospitalOpt
             if i < columns and j + 1 < rows:
                 over = (x + half, y + chosen.room_m, x + pitch - half, y + pitch)
                 found.append((node[i + 1, j], node[i + 1, j + 1], over, False))
-    ends = np.array([pair[:2] for pair in found])
-    order = 1.0 + rng.permutation(len(found))
-    size = columns * rows + 2
-    tree = minimum_spanning_tree(coo_array((order, (ends[:, 0], ends[:, 1])), shape=(size, size)))
-    open_ = np.isin(order, tree.data) | (rng.random(len(found)) < chosen.more_doors)
+    on_tree = on_random_tree(rng, np.array([pair[:2] for pair in found]))
+    open_ = on_tree | (rng.random(len(found)) < chosen.more_doors)
     return [
         Gap(wall, upright, _opening(rng, wall[1 if upright else 0], chosen) if is_open else None)
         for (_, _, wall, upright), is_open in zip(found, open_, strict=True)
@@ -156,6 +160,5 @@ def _walkers(rng: np.random.Generator, rooms: list[Box], chosen: HospitalOptions
     for k in rng.permutation(len(rooms))[: int(chosen.walkers)]:
         x0, y0, x1, y1 = rooms[k]
         y, edge = float(rng.uniform(y0 + 1.0, y1 - 1.0)), 2.0 * WALKER_M
-        speed = float(rng.uniform(*WALKER_MPS))
-        found.append(Circle(center=(x0 + edge, y), radius=WALKER_M, way=[(x1 - edge, y)], speed_mps=speed))
+        found.append(walker(rng, (x0 + edge, y), (x1 - edge, y)))
     return found

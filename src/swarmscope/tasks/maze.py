@@ -7,15 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import minimum_spanning_tree
 
 from swarmscope.bounds import Share
 from swarmscope.sim.world import Obstacle, grid_from_solid
 from swarmscope.tasks._check import check_setup
 from swarmscope.tasks._contract import Amount, Length, Option, Setup, check_robots, read_options
 from swarmscope.tasks._rooms import Box
-from swarmscope.tasks._trips import Floor, TripOptions, Ways, make_trips, setup_on
+from swarmscope.tasks._trips import Floor, TripOptions, Ways, make_trips, on_random_tree, setup_on
 
 NAME = "maze"
 SUMMARY = "corridors one cell wide round blocks, some of the corridors closed, as in the mazes of ORION"
@@ -77,11 +75,8 @@ def _maze(rng: np.random.Generator, columns: int, rows: int, chosen: MazeOptions
             if rng.random() < chosen.cleared:
                 solid[up[i] : up[i + 1], across[j] : across[j + 1]] = 0
     ways = _stretches(across, up)
-    ends = np.array([way[:2] for way in ways])
-    order = 1.0 + rng.permutation(len(ways))
-    size = len(across) * len(up)
-    tree = minimum_spanning_tree(coo_array((order, (ends[:, 0], ends[:, 1])), shape=(size, size)))
-    may_close = ~np.isin(order, tree.data) & (rng.random(len(ways)) < chosen.closed)
+    on_tree = on_random_tree(rng, np.array([way[:2] for way in ways]))
+    may_close = ~on_tree & (rng.random(len(ways)) < chosen.closed)
     for (_, _, rows_of, columns_of, is_rim), closes in zip(ways, may_close, strict=True):
         if closes and not is_rim:
             solid[rows_of, columns_of] = 1

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from swarmscope.bounds import Share
-from swarmscope.sim.world import Circle, Obstacle
+from swarmscope.sim.world import Obstacle
 from swarmscope.tasks._check import check_setup
 from swarmscope.tasks._contract import Amount, Length, Option, Setup, check_robots, read_options
 from swarmscope.tasks._rooms import ASIDE_M, Box, box
-from swarmscope.tasks._trips import Floor, TripOptions, hall_width, make_trips, setup_on
+from swarmscope.tasks._trips import Floor, TripOptions, hall_width, make_trips, setup_on, walker
 
 NAME = "warehouse"
 SUMMARY = "two blocks of aisles between racks, half of the aisles closed, most of them at the far end"
@@ -23,7 +23,6 @@ PLACES = (0.6, 0.25, 0.15)
 FEWEST_OPEN = 3
 ROBOTS_AN_AISLE = 5
 """With more robots there are more aisles."""
-WALKER_M, WALKER_MPS = 0.25, (0.3, 0.6)
 
 
 @dataclass(frozen=True)
@@ -91,6 +90,5 @@ def _walkers(rng: np.random.Generator, way: Box, chosen: WarehouseOptions) -> li
     for _ in range(int(chosen.walkers)):
         x = float(rng.uniform(x0 + ASIDE_M, x1 - ASIDE_M))
         a, b = np.sort(rng.uniform(y0 + ASIDE_M, y1 - ASIDE_M, 2)).tolist()
-        speed = float(rng.uniform(*WALKER_MPS))
-        found.append(Circle(center=(x, a), radius=WALKER_M, way=[(x, b + 0.1)], speed_mps=speed))
+        found.append(walker(rng, (x, a), (x, b + 0.1)))
     return found

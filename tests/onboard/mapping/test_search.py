@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from drawn_maps import length_of, map_of, over_nodes, ring, way_of
 
-from swarmscope.onboard.mapping.cells import FULL, PHASES, is_open, node_place, open_way
+from swarmscope.onboard.mapping.cells import FULL, PHASES, is_open, node_place, open_way, set_cell
 from swarmscope.onboard.mapping.flood import flood
 from swarmscope.onboard.mapping.kept import keep, review
 from swarmscope.onboard.mapping.memory import KEPT, used_bytes
@@ -18,6 +18,7 @@ from swarmscope.onboard.mapping.way import (
     find_shorter,
     find_way,
     forget_and_find,
+    is_on_way,
     nearest_open,
     shorten,
     tighten,
@@ -152,6 +153,18 @@ def test_a_gap_between_the_nodes_is_found_wherever_it_lies(shift):
         memory["phase"] = phase
         found.append(bool(flood(memory, 0.0, 0.0, 80.0, 0.0)) and length_of((0.0, 0.0), way_of(memory)) < 100.0)
     assert any(found)
+
+
+def test_who_is_a_little_beside_an_open_leg_is_on_its_way():
+    """Between two things the next corner is in sight from one line only."""
+    memory = map_of((20, 3), (20, -4))
+    memory["way_n"], memory["way_u"][0] = 1, 40.0
+    assert is_on_way(memory, Spot(10.0, 0.0))
+    assert not open_way(memory, 14.0, 1.5, 40.0, 0.0)
+    assert is_on_way(memory, Spot(14.0, 1.5))
+    assert not is_on_way(memory, Spot(14.0, 4.0))
+    set_cell(memory, 30, 0)
+    assert not is_on_way(memory, Spot(14.0, 1.5))
 
 
 def test_who_is_a_little_beside_where_it_fits_counts_as_being_there():
