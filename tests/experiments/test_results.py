@@ -61,7 +61,7 @@ def test_the_gap_is_taken_over_robots_that_arrived_with_all():
     worst = [run("left", travelled=(20.0, 30.0)), run("left", seed=1, travelled=(10.0, 0.0))]
     ours = [
         run(travelled=(16.0, 99.0), arrival=(40.0, late)),
-        run(seed=1, travelled=(9.0, 0.0)),
+        run(seed=1, travelled=(9.0, 0.0), shortest=(8.0, 0.0)),
         run(seed=2, travelled=(5.0, 5.0)),
     ]
     best = [run("told", travelled=(12.0, 15.0)), run("told", seed=1, travelled=(9.0, 0.0), arrival=(late, 1.0))]
@@ -70,6 +70,8 @@ def test_the_gap_is_taken_over_robots_that_arrived_with_all():
     assert (found.reduction.used, found.robots) == (2, 2)  # who stands at its goal does not count
     assert found.closed.estimate == pytest.approx(4.0 / 8.0) and found.closed.used == 1
     assert path_gap(best, worst, best).closed.estimate == 1.0
+    excess = path_gap(ours, worst, None).closed  # of what the worst goes beyond the true shortest ways
+    assert excess.estimate == pytest.approx((4.0 + 1.0) / (20.0 - 9.5 + 10.0 - 7.6)) and excess.used == 2
     nothing = path_gap([run(seed=7)], worst, best)
     assert math.isnan(nothing.reduction.estimate) and nothing.reduction.used == nothing.robots == 0
 

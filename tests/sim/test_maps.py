@@ -367,6 +367,13 @@ def test_packaged_office_map():
         packaged_map("willow_garage")
 
 
+def test_packaged_lecture_building():
+    grid = load_map(packaged_map("urjc_aulario"))
+    assert (grid.width, grid.height, grid.resolution) == (2295, 1638, 0.05)
+    solid = solid_from_grid(grid)
+    assert 0.02 < np.mean(solid == 0) < 0.6  # most of the picture is what the laser never saw
+
+
 MOVINGAI = "type octile\nheight 2\nwidth 3\nmap\n.@G\nST.\n"
 
 

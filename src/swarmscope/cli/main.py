@@ -419,7 +419,7 @@ def tasks() -> None:
     "[bold]swarmscope reproduce nav-scope --engine ray --address auto[/bold]"
 )
 def reproduce(
-    name: Annotated[str, typer.Argument(help="nav-scope, ablations, sfm-mas, depository, traps or giwt.")],
+    name: Annotated[str, typer.Argument(help="nav-scope, ablations, sfm-mas, depository, traps, giwt or atlas.")],
     maps: Maps = None,
     engine: EngineName = "local",
     workers: Workers = None,

@@ -108,14 +108,17 @@ class PathGap(NamedTuple):
     reduction: Interval
     """1 - sum(l) / sum(l_worst), over robots that arrived with both planners."""
     closed: Interval
-    """sum(l_worst - l) / sum(l_worst - l_best), over robots that arrived with all three."""
+    """sum(l_worst - l) / sum(l_worst - l_best), over robots that arrived with all."""
     robots: int
     """Robots that entered the reduction and moved."""
 
 
-def path_gap(runs: list[Run], worst: list[Run], best: list[Run]) -> PathGap:
-    """Return where the path lengths of ``runs`` lie between those of ``worst`` and ``best`` in the same worlds."""
-    near = {run.seed: run for run in best}
+def path_gap(runs: list[Run], worst: list[Run], best: list[Run] | None) -> PathGap:
+    """Return where the path lengths of ``runs`` lie between those of ``worst`` and ``best`` in the same worlds.
+
+    ``best`` None: the true shortest ways.
+    """
+    near = {run.seed: _bound_of(run, best is None) for run in (runs if best is None else best)}
     shorter, longest, gained, whole, robots = [], [], [], [], 0
     for run, other, both in in_common(runs, worst):
         saved = other.travelled_m - run.travelled_m
@@ -124,12 +127,16 @@ def path_gap(runs: list[Run], worst: list[Run], best: list[Run]) -> PathGap:
             shorter.append(saved[both].sum())
             longest.append(other.travelled_m[both].sum())
         if run.seed in near:
-            bound = near[run.seed]
-            every = both & np.isfinite(bound.arrival_s)
+            every = both & np.isfinite(near[run.seed])
             if other.travelled_m[every].any():
                 gained.append(saved[every].sum())
-                whole.append((other.travelled_m - bound.travelled_m)[every].sum())
+                whole.append((other.travelled_m - near[run.seed])[every].sum())
     return PathGap(bootstrap_ratio(shorter, longest), bootstrap_ratio(gained, whole), robots)
+
+
+def _bound_of(run: Run, shortest: bool) -> Floats:
+    """Return the ways (N,) that bound a gap [m], NaN where there is none."""
+    return run.any_angle_m if shortest else np.where(np.isfinite(run.arrival_s), run.travelled_m, np.nan)
 
 
 def flow_time_increases(runs: Iterable[Run], others: Iterable[Run]) -> tuple[Floats, Floats]:

@@ -23,13 +23,13 @@ def robot():
     return bot
 
 
-def look(bot, scan, deep=0.0, times=1):
+def look(bot, scan, deep=0.0, times=1, cautious=True):
     """Let a scan be learnt."""
     view = bot.view
     for _ in range(times):
         view.scan[:] = scan
         view.masked[:] = scan
-        learn(view, bot.memory, CELL, deep)
+        learn(view, bot.memory, CELL, deep, cautious)
 
 
 def cell(x, y):
@@ -112,6 +112,18 @@ def test_what_fills_a_part_of_a_cell_is_not_cleared_by_the_beams_beside_it():
     world = circles_world([(1.52, 0.03, 0.015)])
     look(bot, scan_at(world, RIG), times=50 * EVERY)
     assert is_set(bot.memory, *cell(1.505, 0.03))
+
+
+def test_naive_clearing_takes_a_post_away_when_a_beam_passes_it():
+    """What the ablation is to show: the middle of the cell is passed, though something stands in it."""
+    bot = robot()
+    x, y = cell(1.505, 0.03)
+    scan = scan_at(circles_world([(1.52, (y + 0.85) * CELL, 0.008)]), RIG)
+    look(bot, scan, times=3 * EVERY)
+    assert is_set(bot.memory, x, y)
+    assert bot.memory["opened"] == 0
+    look(bot, scan, times=EVERY, cautious=False)
+    assert bot.memory["opened"] == 1
 
 
 def test_a_cell_that_comes_back_is_cleared_more_slowly_and_then_no_more():

@@ -69,6 +69,27 @@ def test_a_wall_is_still_there_when_the_robot_comes_back(ex, ey):
     assert open_way(memory, 0.0, 0.0, 0.0, 12.0)
 
 
+@pytest.mark.parametrize(("ex", "ey"), [(1, 0), (-1, 0), (0, 1), (0, -1)])
+@pytest.mark.parametrize("nodes", [20, 32, 51])
+def test_an_ablation_forgets_what_is_farther_away(ex, ey, nodes):
+    memory = map_of(*((x, y) for x in range(-20, 21, 4) for y in range(-20, 21, 4)))
+    memory["forget_n"] = nodes
+    reach = max(nodes, 30) * NODE  # never less than the fine layer
+    near, far = reach - 2 * WIDE // 8, reach + WIDE // 8
+    for k in range(near):
+        move_fine_layer(memory, k * ex, k * ey)
+    assert not fits(memory, 0.5, 0.5)
+    for k in range(near, far):
+        move_fine_layer(memory, k * ex, k * ey)
+    assert not is_near(memory, 0, 0)
+    assert fits(memory, 0.5, 0.5)
+    assert not memory["rows"].any()
+    block_round(memory, 0.5, 0.5)
+    assert fits(memory, 0.5, 0.5)
+    block_round(memory, (far - 135) * ex + 0.5, (far - 135) * ey + 0.5)
+    assert memory["rows"].any() == (nodes > 34)
+
+
 def test_what_has_gone_for_good_does_not_come_back():
     memory = map_of(*((x, 20) for x in range(-60, 61)))
     for k in range(300):

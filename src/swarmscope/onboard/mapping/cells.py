@@ -135,6 +135,8 @@ def _shift(memory: Row, ex: int, ey: int) -> None:
         ask_for(memory, LESS)
         block(memory, kx, ky, not fits_here, not fits_here and _any_fits(memory, kx, ky))
         ask_for(memory, FULL)
+    if memory["forget_n"] > 0:
+        _forget_behind(memory, ex, ey)
     first = 0 if ex + ey > 0 else NODES - 1  # the line that leaves the layer
     for k in range(NODES):
         kx, ky = (x0 + first, y0 + k) if ex != 0 else (x0 + k, y0 + first)
@@ -149,6 +151,28 @@ def _shift(memory: Row, ex: int, ey: int) -> None:
         kx, ky = (x0 + last, y0 + k) if ex != 0 else (x0 + k, y0 + last)
         if is_blocked(memory, kx, ky):
             set_cell(memory, NODE * kx + 2, NODE * ky + 2)
+
+
+@jit_inner
+def _forget_behind(memory: Row, ex: int, ey: int) -> None:
+    """Forget the line of nodes that a step along (ex, ey) leaves farther behind than is remembered."""
+    n = max(memory["forget_n"], NODES // 2 - RIM)
+    x0, y0 = memory["west"] // NODE + NODES // 2, memory["south"] // NODE + NODES // 2
+    behind = -n if ex + ey > 0 else n - 1
+    for k in range(-n, n):
+        kx, ky = (x0 + behind, y0 + k) if ex != 0 else (x0 + k, y0 + behind)
+        block(memory, kx, ky, False, False)
+
+
+@jit_inner
+def _is_forgotten(memory: Row, kx: int, ky: int) -> bool:
+    """Tell whether a node is so far away that it is not remembered."""
+    n = memory["forget_n"]
+    if n == 0:
+        return False
+    n = max(n, NODES // 2 - RIM)
+    x, y = kx - memory["west"] // NODE - NODES // 2, ky - memory["south"] // NODE - NODES // 2
+    return not (-n <= x < n and -n <= y < n)
 
 
 @jit_inner
@@ -174,7 +198,7 @@ def block_round(memory: Row, u: float, v: float) -> None:
     for ky in range(int(math.ceil((v - r - 2) / NODE)), int(math.floor((v + r - 2) / NODE)) + 1):
         for kx in range(int(math.ceil((u - r - 2) / NODE)), int(math.floor((u + r - 2) / NODE)) + 1):
             d2 = (NODE * kx + 2 - u) ** 2 + (NODE * ky + 2 - v) ** 2
-            if d2 < r * r:
+            if d2 < r * r and not _is_forgotten(memory, kx, ky):
                 slim = d2 >= less * less and (is_slim(memory, kx, ky) or not is_blocked(memory, kx, ky))
                 block(memory, kx, ky, True, slim)
 

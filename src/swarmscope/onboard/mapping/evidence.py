@@ -42,9 +42,11 @@ EVERY = 4
 
 
 @jit
-def learn(see: View, memory: Row, cell_m: float, deep_m: float) -> None:
-    """Take this tick's scan into the map. Cells that close the way are noted in ``closed``, others gone in
-    ``opened``."""
+def learn(see: View, memory: Row, cell_m: float, deep_m: float, cautious: bool) -> None:
+    """Take this tick's scan into the map. Cells that close the way are noted in ``closed``, others gone in ``opened``.
+
+    ``cautious``: a cell is cleared as `_is_passed` and `_pass` say, else as soon as one beam goes through its middle.
+    """
     shared, rig = see.shared, see.rig
     u, v = shared["x"] / cell_m, shared["y"] / cell_m
     here = Spot(u, v)
@@ -68,7 +70,7 @@ def learn(see: View, memory: Row, cell_m: float, deep_m: float) -> None:
         _hit(memory, here, ix, iy)
         if deep_m > 0.0 and (r > CLEARS_WITHIN_M or _is_hidden(see, n, r + deep_m)):
             _hit(memory, here, int(math.floor(hu + deep_m * eu)), int(math.floor(hv + deep_m * ev)))
-    _clear_passed(see, memory, cell_m)
+    _clear_passed(see, memory, cell_m, cautious)
     memory["ticks"] += 1
 
 
@@ -159,7 +161,7 @@ def _move_near(memory: Row, cx: int, cy: int) -> None:
 
 
 @jit
-def _clear_passed(see: View, memory: Row, cell_m: float) -> None:
+def _clear_passed(see: View, memory: Row, cell_m: float, cautious: bool) -> None:
     """Look at some of the near cells in the map for whether all beams pass them."""
     u, v = see.shared["x"] / cell_m, see.shared["y"] / cell_m
     reach = min(NEAR // 2 - 1, int(CLEARS_WITHIN_M / cell_m))
@@ -172,7 +174,12 @@ def _clear_passed(see: View, memory: Row, cell_m: float) -> None:
         while row != ZERO:
             ix = x0 + lowest(row)
             row = without_lowest(row)
-            if _is_passed(see, ix + 0.5 - u, iy + 0.5 - v, cell_m):
+            du, dv = ix + 0.5 - u, iy + 0.5 - v
+            if not cautious:
+                if _is_crossed(see, du, dv, cell_m):
+                    clear_cell(memory, ix, iy)
+                    memory["opened"] = 1
+            elif _is_passed(see, du, dv, cell_m):
                 _pass(memory, ix, iy, see.percept["now_s"])
 
 
@@ -198,6 +205,17 @@ def _is_passed(see: View, du: float, dv: float, cell_m: float) -> bool:
         if sensor.field > 0 and not see.shared["view_first"] <= n <= see.shared["view_last"]:
             return False
     return True
+
+
+@jit_inner
+def _is_crossed(see: View, du: float, dv: float, cell_m: float) -> bool:
+    """Tell whether the beam through the middle of the cell that lies (du, dv) [cells] from here ends behind it."""
+    c, s = math.cos(see.percept["compass"]), math.sin(see.percept["compass"])
+    x, y = c * du + s * dv, c * dv - s * du
+    sensor = see.rig.sensor
+    n, there = _wrapped(see, int(round((rough_angle(x, y + 1e-12) - sensor.angle_min) / sensor.increment)))
+    behind = cell_m * (math.sqrt(du * du + dv * dv) + 0.5)
+    return there and see.unseen[n] == 0 and behind < sensor.range_max and bool(see.scan[n] >= behind)
 
 
 @jit_inner

@@ -34,6 +34,7 @@ MAP = np.dtype(
         ("slim_at", np.uint8, PAGES),  # 1 + where what follows has a page's nodes, 0 = none of them are
         ("slim", np.uint64, (SLIM_PAGES, WORD)),  # nodes that are blocked, but less room would do
         ("slims_n", np.int64),
+        ("forget_n", np.int64),  # nodes beyond which they are forgotten, 0 = none is
         ("room", np.uint8),  # how much room is asked for now
         ("phase", np.int64),  # how the fine layer's nodes are moved now
         ("disc", np.uint32, (DISCS, QUARTERS, QUARTERS, DISC_ROWS)),  # what must be free round a robot

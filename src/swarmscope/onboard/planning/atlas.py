@@ -12,13 +12,13 @@ import math
 from typing import Annotated, NamedTuple
 
 from swarmscope._jit import jit_inline, jit_inner
-from swarmscope.bounds import Bounds, Metres, Seconds
+from swarmscope.bounds import Bounds, Flag, Metres, Seconds
 from swarmscope.geometry import wrap_angle
 from swarmscope.onboard.control.wanting import halt, head_for
 from swarmscope.onboard.deciding.evading import Evading, comes, evade, keep_right
 from swarmscope.onboard.deciding.following import away_from_nearest
 from swarmscope.onboard.deciding.progress import last_speed
-from swarmscope.onboard.mapping.cells import FULL, ask_for, draw_discs
+from swarmscope.onboard.mapping.cells import FULL, NODE, ask_for, draw_discs
 from swarmscope.onboard.mapping.evidence import learn
 from swarmscope.onboard.mapping.kept import keep, review
 from swarmscope.onboard.mapping.memory import MAP, new_memory
@@ -108,6 +108,10 @@ class Params(NamedTuple):
     """A gap before which something has been in the way for so long is too narrow."""
     keep_s: Seconds = 60.0
     """So long it is kept closed."""
+    forget_m: Metres = 0.0
+    """What is farther away along x or y is forgotten, but for the fine layer; 0: nothing is. For studies."""
+    cautious: Flag = 1
+    """1: a near cell is cleared when all beams across it pass, several times; 0: as soon as one does. For studies."""
 
 
 @jit_inline
@@ -117,6 +121,7 @@ def decide(see: View, memory: Row, params: Params) -> None:
     percept, shared = see.percept, see.shared
     if memory["disc_half"] == 0:
         draw_discs(memory, (see.rig.body.radius_m + params.margin_m) / cell, see.rig.footprint / cell)
+        memory["forget_n"] = math.ceil(params.forget_m / (cell * NODE))
     if memory["arrived"] or percept["goal_distance"] <= params.arrive_m:
         memory["arrived"] = 1
         halt(see)
@@ -132,7 +137,7 @@ def decide(see: View, memory: Row, params: Params) -> None:
         return
     review(memory, see.percept["now_s"])
     _note_standing(see, memory, params.still_s, cell)
-    learn(see, memory, cell, params.deep_m)
+    learn(see, memory, cell, params.deep_m, params.cautious == 1)
     forgot = _keep_way(see, memory, params, here, goal)
     _drive(see, memory, params, here, forgot)
 

@@ -81,11 +81,14 @@ class Material:
     def gap(self, place: str, planner: str) -> PathGap | None:
         """Return where the planner's path lengths lie between the experiment's two; None where these were not run."""
         asked = self.experiment.gap
-        if asked is None or not all(self.of(place, name) for name in (planner, asked.worst, asked.best)):
+        if asked is None:
+            return None
+        best = None if asked.best is None else self.of(place, asked.best)
+        ours, worst = self.of(place, planner), self.of(place, asked.worst)
+        if not (ours and worst) or best == []:
             return None
         if (place, planner) not in self._gaps:
-            three = (self.of(place, name) for name in (planner, asked.worst, asked.best))
-            self._gaps[place, planner] = path_gap(*three)
+            self._gaps[place, planner] = path_gap(ours, worst, best)
         return self._gaps[place, planner]
 
     def published(self, metric: str, place: str, planner: str) -> float | None:

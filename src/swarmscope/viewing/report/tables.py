@@ -132,10 +132,14 @@ def gap_table(material: Material) -> Table | None:
     if not any(material.gap(place, planner) for planner in others for place in places):
         return None
     rows = [_row(material, planner, [_gap(material, place, planner) for place in places]) for planner in others]
-    caption = (
-        f"Ways of robots that arrived with both planners: how much shorter than with {asked.worst}; of robots that "
-        f"also arrived with {asked.best}: the share of the gap between {asked.worst} and {asked.best} that is closed."
-    )
+    caption = f"Ways of robots that arrived with both planners: how much shorter than with {asked.worst}; "
+    if asked.best is None:
+        caption += f"and the share of what {asked.worst} goes beyond the true shortest way that is gone."
+    else:
+        caption += (
+            f"of robots that also arrived with {asked.best}: the share of the gap between {asked.worst} and "
+            f"{asked.best} that is closed."
+        )
     published = any(material.published(GAP_METRIC, place, asked.worst) for place in places)
     note = "Published values follow from the published mean path lengths." if published else ""
     return Table(caption, ["", *places], rows, note)
@@ -156,7 +160,8 @@ def _gap(material: Material, place: str, planner: str) -> Value:
         lines.append(Line(f"closes {' '.join(closed)}".rstrip(), "sub"))
     entered = f"{words.count(found.robots, 'robot')}, {words.count(found.reduction.used, 'map')}"
     lines.append(Line(entered, "sub"))
-    ours, worst, best = (material.published(GAP_METRIC, place, name) for name in (planner, asked.worst, asked.best))
+    ours, worst = (material.published(GAP_METRIC, place, name) for name in (planner, asked.worst))
+    best = None if asked.best is None else material.published(GAP_METRIC, place, asked.best)
     if ours is None or worst is None:
         return lines
     printed = 1.0 - ours / worst
