@@ -16,7 +16,7 @@ from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.onboard.mapping.cells import FULL, NODE, NODES, RIM, WIDE, node_place, open_way
 from swarmscope.onboard.mapping.memory import CORNERS
 from swarmscope.onboard.mapping.pages import NO_PAGE, PAGE_BITS
-from swarmscope.onboard.mapping.words import ONE, WORD, ZERO, Spot, bit, number
+from swarmscope.onboard.mapping.words import ONE, WORD, ZERO, Spot, bit, lowest, number, without_lowest
 from swarmscope.onboard.percept import Row
 
 MARGIN = 4
@@ -26,8 +26,6 @@ MOST_PAGES = 8
 LABELS = 6
 BLOCKED = 7
 MOST_WAVES = 20_000
-ROWS_ON = MOST_PAGES
-"""Words that say which rows the last wave has reached."""
 
 
 class Frame(NamedTuple):
@@ -53,7 +51,7 @@ def flood(memory: Row, u0: float, v0: float, u1: float, v1: float) -> bool:
     """
     memory["way_n"] = 0
     frame = _frame(memory, u0, v0, u1, v1)
-    memory["scratch_n"] = max(memory["scratch_n"], 2 * ROWS_ON + 3 * frame.words * frame.height)
+    memory["scratch_n"] = max(memory["scratch_n"], _at(frame, 3, 0, 0))
     _block(memory, frame)
     start = _open_node(memory, frame, u0, v0)
     goal = _open_node(memory, frame, u1, v1)
@@ -87,15 +85,21 @@ def _frame(memory: Row, u0: float, v0: float, u1: float, v1: float) -> Frame:
 
 
 @jit_inline
+def _marks(frame: Frame) -> int:
+    """Return how many words say in which words of nodes a wave is, a bit each; twice, for the last and the next."""
+    return frame.words * (frame.height >> PAGE_BITS)
+
+
+@jit_inline
 def _at(frame: Frame, plane: int, y: int, w: int) -> int:
-    return 2 * ROWS_ON + (plane * frame.height + y) * frame.words + w
+    return 2 * _marks(frame) + (plane * frame.height + y) * frame.words + w
 
 
 @jit
 def _block(memory: Row, frame: Frame) -> None:
     """Write which nodes cannot be gone over: label 7, all others 0."""
     scratch = memory["scratch"]
-    for k in range(2 * ROWS_ON + 3 * frame.words * frame.height):
+    for k in range(_at(frame, 3, 0, 0)):
         scratch[k] = ZERO
     _block_pages(memory, frame)
     x0, y0 = memory["west"] // NODE - frame.ox, memory["south"] // NODE - frame.oy
@@ -187,37 +191,6 @@ def _passable(memory: Row, frame: Frame, y: int, w: int) -> np.uint64:
     return ~_labelled(memory, frame, y, w, BLOCKED) if 0 <= w < frame.words and 0 <= y < frame.height else ZERO
 
 
-@jit_inline
-def _widened(left: np.uint64, here: np.uint64, right: np.uint64) -> np.uint64:
-    """Return 64 nodes with those beside them, given the 64 to the left and to the right."""
-    return here | (here << ONE) | (here >> ONE) | (left >> np.uint64(63)) | (right << np.uint64(63))
-
-
-@jit_inline
-def _beside(memory: Row, frame: Frame, y: int, w: int, label: int) -> np.uint64:
-    """Return which of 64 nodes carry ``label`` or lie left or right of one that does."""
-    return _widened(
-        _labelled(memory, frame, y, w - 1, label),
-        _labelled(memory, frame, y, w, label),
-        _labelled(memory, frame, y, w + 1, label),
-    )
-
-
-@jit_inline
-def _across(memory: Row, frame: Frame, y: int, other: int, w: int, label: int) -> np.uint64:
-    """Return which of 64 nodes of row ``y`` lie across a corner from one of row ``other`` that carries ``label``.
-
-    One of the two nodes between must not be blocked: nobody squeezes through between two that are.
-    """
-    first = _beside(memory, frame, other, w, label) & _passable(memory, frame, other, w)
-    then = _widened(
-        _labelled(memory, frame, other, w - 1, label) & _passable(memory, frame, y, w - 1),
-        _labelled(memory, frame, other, w, label) & _passable(memory, frame, y, w),
-        _labelled(memory, frame, other, w + 1, label) & _passable(memory, frame, y, w + 1),
-    )
-    return first | then
-
-
 @jit
 def _spread(memory: Row, frame: Frame, start: tuple[int, int], goal: tuple[int, int]) -> int:
     """Let waves go out from a node; return the number of the one that reaches another, -1: none does."""
@@ -225,21 +198,18 @@ def _spread(memory: Row, frame: Frame, start: tuple[int, int], goal: tuple[int, 
     _write_label(memory, frame, start[0], start[1], 1)
     if start == goal:
         return 0
-    scratch[start[1] >> 6] = bit(start[1] & (WORD - 1))
-    low, high = start[1], start[1]
+    k = start[1] * frame.words + (start[0] >> 6)
+    marks = _marks(frame)
+    scratch[marks + (k >> 6)] |= bit(k & (WORD - 1))
     for wave in range(1, MOST_WAVES):
-        on, off = ROWS_ON * ((wave - 1) & 1), ROWS_ON * (wave & 1)
-        first, last = max(0, low - 1), min(frame.height - 1, high + 1)
-        low, high = frame.height, -1
-        for k in range(ROWS_ON):
-            scratch[off + k] = ZERO
-        for y in range(first, last + 1):
-            if (_is_on(memory, on, y - 1) or _is_on(memory, on, y) or _is_on(memory, on, y + 1)) and _reach_row(
-                memory, frame, y, wave
-            ):
-                low, high = min(low, y), max(high, y)
-                scratch[off + (y >> 6)] |= bit(y & (WORD - 1))
-        if high < 0:
+        now, some = marks * (wave & 1), False
+        for m in range(marks):
+            marked = scratch[now + m]
+            scratch[now + m] = ZERO
+            while marked != ZERO:
+                some = _go_on(memory, frame, WORD * m + lowest(marked), wave) or some
+                marked = without_lowest(marked)
+        if not some:
             return -1
         if _label(memory, frame, goal[0], goal[1]) != 0:
             return wave
@@ -247,33 +217,49 @@ def _spread(memory: Row, frame: Frame, start: tuple[int, int], goal: tuple[int, 
 
 
 @jit_inner
-def _reach_row(memory: Row, frame: Frame, y: int, wave: int) -> bool:
-    """Let a wave go over the nodes of a row; return whether it reaches new ones."""
-    scratch, plane = memory["scratch"], frame.words * frame.height
-    before, label = (wave - 1) % LABELS + 1, wave % LABELS + 1
-    some = ZERO
-    for w in range(frame.words):
-        reached = _beside(memory, frame, y, w, before)
+def _go_on(memory: Row, frame: Frame, k: int, wave: int) -> bool:
+    """Let a wave go on from those nodes of word ``k``, counted row by row, that the last one has reached.
+
+    Return whether it reaches new ones. Across a corner it goes only if one of the two nodes between is not blocked:
+    nobody squeezes through between two that are.
+    """
+    y, w = k // frame.words, k % frame.words
+    here = _labelled(memory, frame, y, w, (wave - 1) % LABELS + 1)
+    some = _reach(memory, frame, y, w, (here << ONE) | (here >> ONE), wave)
+    low, high = here & ONE, here >> np.uint64(WORD - 1)
+    if low:
+        some = _reach(memory, frame, y, w - 1, bit(WORD - 1), wave) or some
+    if high:
+        some = _reach(memory, frame, y, w + 1, ONE, wave) or some
+    for other in range(y - 1, y + 2, 2):
+        beside = here
         if _wide(wave):
-            reached |= _across(memory, frame, y, y - 1, w, before) | _across(memory, frame, y, y + 1, w, before)
-        else:
-            reached |= _labelled(memory, frame, y - 1, w, before) | _labelled(memory, frame, y + 1, w, before)
-        if reached == ZERO:
-            continue
-        at = _at(frame, 0, y, w)
-        reached &= ~(scratch[at] | scratch[at + plane] | scratch[at + 2 * plane])
-        for k in range(3):
-            if (label >> k) & 1:
-                scratch[at + k * plane] |= reached
-        some |= reached
-    return bool(some != ZERO)
+            straight, along = here & _passable(memory, frame, other, w), _passable(memory, frame, y, w)
+            beside |= (straight << ONE) | (straight >> ONE) | (((here << ONE) | (here >> ONE)) & along)
+            if low and (straight & ONE or _passable(memory, frame, y, w - 1) >> np.uint64(WORD - 1)):
+                some = _reach(memory, frame, other, w - 1, bit(WORD - 1), wave) or some
+            if high and (straight >> np.uint64(WORD - 1) or _passable(memory, frame, y, w + 1) & ONE):
+                some = _reach(memory, frame, other, w + 1, ONE, wave) or some
+        some = _reach(memory, frame, other, w, beside, wave) or some
+    return some
 
 
-@jit_inline
-def _is_on(memory: Row, base: int, y: int) -> bool:
-    if y < 0 or y >= ROWS_ON * WORD:
+@jit
+def _reach(memory: Row, frame: Frame, y: int, w: int, wanted: np.uint64, wave: int) -> bool:
+    """Label those of some nodes of a word that are open and that no wave has reached; return whether there are any."""
+    if w < 0 or w >= frame.words or y < 0 or y >= frame.height:
         return False
-    return bool((memory["scratch"][base + (y >> 6)] >> np.uint64(y & (WORD - 1))) & ONE)
+    scratch, plane, at = memory["scratch"], frame.words * frame.height, _at(frame, 0, y, w)
+    new = wanted & ~(scratch[at] | scratch[at + plane] | scratch[at + 2 * plane])
+    if new == ZERO:
+        return False
+    label = wave % LABELS + 1
+    for one in range(3):
+        if (label >> one) & 1:
+            scratch[at + one * plane] |= new
+    k = y * frame.words + w
+    scratch[_marks(frame) * ((wave - 1) & 1) + (k >> 6)] |= bit(k & (WORD - 1))
+    return True
 
 
 @jit_inline

@@ -17,7 +17,7 @@ KEPT = 8
 """Places that are kept closed at once."""
 CORNERS = 64
 """Of a way, the goal included."""
-SCRATCH = 12288 + 16
+SCRATCH = 12288 + 128
 """Words for searches; places up to 64 m x 64 m take the first 3072."""
 
 MAP = np.dtype(
