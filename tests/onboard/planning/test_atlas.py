@@ -66,6 +66,15 @@ def test_somebody_parked_in_the_way_is_gone_round():
     assert trace.robots[0]["length"] < 6.4
 
 
+def test_somebody_parked_in_the_only_short_way_is_not_gone_to_again_and_again():
+    """In a ring of corridors the short way is closed by a robot at its goal, out of sight from where one turns off."""
+    outside = wall((-0.5, -0.5), (14.5, -0.5), (14.5, 10.5), (-0.5, 10.5), (-0.5, -0.5))
+    inside = wall((0.5, 0.5), (13.5, 0.5), (13.5, 9.5), (0.5, 9.5), (0.5, 0.5))
+    trace = drive([(0, 0, 0), (7, 0, 0)], [(14, 0), (7, 0)], [outside, inside], bounds=(-1, -1, 15, 11), limit_s=200.0)
+    assert trace.robots["arrived"].all()
+    assert trace.robots[0]["length"] < 60.0  # there, back, and round: 4 + 4 + 34
+
+
 def test_the_same_run_by_one_thread_and_by_many():
     scenario = {"task": {"name": "T3"}, "robots": 8, "seed": 1003, "limit_s": 60.0, "record_scans": "no"} | ATLAS
     one, many = run_scenario(scenario, 1), run_scenario(scenario, 4)

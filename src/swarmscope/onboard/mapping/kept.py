@@ -1,14 +1,20 @@
-"""Gaps that a robot keeps closed for a while though they are open by its map: its body would not take them."""
+"""Places that a robot keeps closed for a while though they are open by its map.
+
+Gaps that its body would not take; and where somebody stood when last seen, if that is not the first time: a robot that
+turns back for somebody out of sight, and comes again as soon as it no longer sees why, does so for ever.
+"""
 
 from __future__ import annotations
 
 from swarmscope._jit import jit, jit_inline
-from swarmscope.onboard.mapping.memory import KEPT
-from swarmscope.onboard.mapping.words import Spot
+from swarmscope.onboard.mapping.memory import KEPT, LOST
+from swarmscope.onboard.mapping.words import Spot, number
 from swarmscope.onboard.percept import Row
 
 SAME = 4.0
 """Places so near to each other [cells] are one."""
+LOST_S, MOST_DOUBLINGS = 15.0, 5
+"""Who is lost from sight for the second time is thought to stand there for so long; each time twice as long."""
 
 
 @jit
@@ -41,3 +47,21 @@ def review(memory: Row, now_s: float) -> None:
     if n < memory["kept_n"]:
         memory["opened"] = 1
     memory["kept_n"] = n
+
+
+@jit
+def lose_sight(memory: Row, place: Spot, r: float, now_s: float) -> None:
+    """Note that somebody who stood at a place is out of sight; keep ``r`` [cells] off it if that happens again."""
+    at = -1
+    for k in range(LOST):
+        near = (memory["lost_u"][k] - place.u) ** 2 + (memory["lost_v"][k] - place.v) ** 2 < SAME * SAME
+        if near and memory["lost_times"][k] > 0:
+            at = k
+    if at < 0:
+        at = memory["lost_at"] % LOST
+        memory["lost_at"] += 1
+        memory["lost_u"][at], memory["lost_v"][at], memory["lost_times"][at] = place.u, place.v, 0
+    times = number(memory["lost_times"][at])
+    memory["lost_times"][at] = min(times + 1, MOST_DOUBLINGS + 1)
+    if times > 0:
+        keep(memory, place, r, now_s + LOST_S * 2.0 ** (times - 1))

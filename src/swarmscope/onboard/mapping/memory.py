@@ -15,6 +15,8 @@ GONE = 32
 """Cells that are known to have been cleared."""
 KEPT = 8
 """Places that are kept closed at once."""
+LOST = 16
+"""Places of robots that stood when they were last seen, the newest over the oldest."""
 CORNERS = 64
 """Of a way, the goal included."""
 SCRATCH = 12288 + 128
@@ -63,6 +65,11 @@ MAP = np.dtype(
         ("kept_v", np.float32, KEPT),
         ("kept_r", np.float32, KEPT),  # how far the robot's middle keeps away [cells]
         ("kept_s", np.float64, KEPT),  # until when
+        # robots that stood when they went out of sight: where, and how often that has happened there
+        ("lost_u", np.float32, LOST),  # [cells]
+        ("lost_v", np.float32, LOST),
+        ("lost_times", np.uint8, LOST),  # 0 = nobody
+        ("lost_at", np.int64),
         ("beside_s", np.float64),  # how long something has been between the robot and its next corner
         # the way: corners still ahead, the goal last [cells]
         ("way_u", np.float64, CORNERS),

@@ -20,7 +20,7 @@ from swarmscope.onboard.deciding.following import away_from_nearest
 from swarmscope.onboard.deciding.progress import last_speed
 from swarmscope.onboard.mapping.cells import FULL, NODE, ask_for, draw_discs
 from swarmscope.onboard.mapping.evidence import learn
-from swarmscope.onboard.mapping.kept import keep, review
+from swarmscope.onboard.mapping.kept import SAME, keep, lose_sight, review
 from swarmscope.onboard.mapping.memory import MAP, new_memory
 from swarmscope.onboard.mapping.way import START_WITHIN, find_shorter, forget_and_find, is_on_way, nearest_open, shorten
 from swarmscope.onboard.mapping.words import Spot, number
@@ -146,6 +146,7 @@ def decide(see: View, memory: Row, params: Params) -> None:
 def _note_standing(see: View, memory: Row, still_s: float, cell: float) -> None:
     """Note where neighbours stand for long."""
     shared, n = see.shared, 0
+    _note_lost(see, memory, cell)
     for t in range(PEERS):
         if shared["track_id"][t] < 0 or moves(see.percept, shared, t, still_s):
             continue
@@ -158,6 +159,21 @@ def _note_standing(see: View, memory: Row, still_s: float, cell: float) -> None:
     elif n < memory["stand_n"]:
         memory["opened"] = 1
     memory["stand_n"] = n
+
+
+@jit_inner
+def _note_lost(see: View, memory: Row, cell: float) -> None:
+    """Note who stood and is out of sight now: nobody is seen where it was, who might have begun to move."""
+    shared = see.shared
+    for k in range(memory["stand_n"]):
+        place = Spot(float(memory["stand_u"][k]), float(memory["stand_v"][k]))
+        seen = False
+        for t in range(PEERS):
+            du = (shared["x"] + shared["track_x"][t]) / cell - place.u
+            dv = (shared["y"] + shared["track_y"][t]) / cell - place.v
+            seen = seen or (shared["track_id"][t] >= 0 and du * du + dv * dv < SAME * SAME)
+        if not seen:
+            lose_sight(memory, place, float(memory["stand_r"][k]), see.percept["now_s"])
 
 
 @jit_inline
