@@ -18,7 +18,7 @@ import numpy as np
 
 from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.onboard.mapping.pages import PAGE_BITS, block, forget_pages, is_blocked, is_slim
-from swarmscope.onboard.mapping.words import ONE, WORD, ZERO, bit, window
+from swarmscope.onboard.mapping.words import ONE, WORD, ZERO, bit, number, window
 from swarmscope.onboard.percept import Row
 
 WIDE = 256
@@ -156,7 +156,7 @@ def _shift(memory: Row, ex: int, ey: int) -> None:
 @jit_inner
 def _forget_behind(memory: Row, ex: int, ey: int) -> None:
     """Forget the line of nodes that a step along (ex, ey) leaves farther behind than is remembered."""
-    n = max(memory["forget_n"], NODES // 2 - RIM)
+    n = max(number(memory["forget_n"]), NODES // 2 - RIM)
     x0, y0 = memory["west"] // NODE + NODES // 2, memory["south"] // NODE + NODES // 2
     behind = -n if ex + ey > 0 else n - 1
     for k in range(-n, n):
@@ -167,7 +167,7 @@ def _forget_behind(memory: Row, ex: int, ey: int) -> None:
 @jit_inner
 def _is_forgotten(memory: Row, kx: int, ky: int) -> bool:
     """Tell whether a node is so far away that it is not remembered."""
-    n = memory["forget_n"]
+    n = number(memory["forget_n"])
     if n == 0:
         return False
     n = max(n, NODES // 2 - RIM)

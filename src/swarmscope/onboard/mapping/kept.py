@@ -58,8 +58,8 @@ def lose_sight(memory: Row, place: Spot, r: float, now_s: float) -> None:
         if near and memory["lost_times"][k] > 0:
             at = k
     if at < 0:
-        at = memory["lost_at"] % LOST
-        memory["lost_at"] += 1
+        at = number(memory["lost_at"])
+        memory["lost_at"] = (at + 1) % LOST
         memory["lost_u"][at], memory["lost_v"][at], memory["lost_times"][at] = place.u, place.v, 0
     times = number(memory["lost_times"][at])
     memory["lost_times"][at] = min(times + 1, MOST_DOUBLINGS + 1)

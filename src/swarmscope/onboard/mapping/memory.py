@@ -15,7 +15,7 @@ GONE = 32
 """Cells that are known to have been cleared."""
 KEPT = 8
 """Places that are kept closed at once."""
-LOST = 16
+LOST = 12
 """Places of robots that stood when they were last seen, the newest over the oldest."""
 CORNERS = 64
 """Of a way, the goal included."""
@@ -36,7 +36,7 @@ MAP = np.dtype(
         ("slim_at", np.uint8, PAGES),  # 1 + where what follows has a page's nodes, 0 = none of them are
         ("slim", np.uint64, (SLIM_PAGES, WORD)),  # nodes that are blocked, but less room would do
         ("slims_n", np.int64),
-        ("forget_n", np.int64),  # nodes beyond which they are forgotten, 0 = none is
+        ("forget_n", np.int16),  # nodes beyond which they are forgotten, 0 = none is
         ("room", np.uint8),  # how much room is asked for now
         ("phase", np.int64),  # how the fine layer's nodes are moved now
         ("disc", np.uint32, (DISCS, QUARTERS, QUARTERS, DISC_ROWS)),  # what must be free round a robot
@@ -69,7 +69,7 @@ MAP = np.dtype(
         ("lost_u", np.float32, LOST),  # [cells]
         ("lost_v", np.float32, LOST),
         ("lost_times", np.uint8, LOST),  # 0 = nobody
-        ("lost_at", np.int64),
+        ("lost_at", np.uint8),
         ("beside_s", np.float64),  # how long something has been between the robot and its next corner
         # the way: corners still ahead, the goal last [cells]
         ("way_u", np.float64, CORNERS),
