@@ -29,11 +29,12 @@ def play_again(
     """
     setting = judged_setting(scenario, make_setup(scenario), threads)
     exact = Exact()
-    _check_same(found, run(replace(setting, record_scans=False), progress, *exact.watch))
+    check_same(found, run(replace(setting, record_scans=False), progress, *exact.watch))
     return exact
 
 
-def _check_same(found: RunData, trace: Trace) -> None:
+def check_same(found: RunData, trace: Trace) -> None:
+    """Raise an InputFileError when a run that was played again did not come out as it did."""
     for name, record in SAME.items():
         there, here = getattr(found.trajectory, name), getattr(trace.records, record)
         if not np.array_equal(there, here):

@@ -1,0 +1,1 @@
+"""What robots that remember knew at every moment of a finished run."""
