@@ -16,7 +16,7 @@ from swarmscope.errors import InputFileError
 from swarmscope.viewing import replay
 from swarmscope.viewing.replay import write_replay
 
-DTYPES = {"f8": "<f8", "f4": "<f4", "i4": "<i4", "i1": "i1", "u1": "u1"}
+DTYPES = {"f8": "<f8", "f4": "<f4", "i4": "<i4", "i2": "<i2", "i1": "i1", "u1": "u1"}
 
 
 @pytest.fixture

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from fake_run import make_fake_run
 
+from swarmscope.viewing.memories.again import Memories, Moment
 from swarmscope.viewing.replay import write_replay
 
 OPTIONS = (
@@ -100,6 +101,33 @@ def click_robot(page: Any, robot: int) -> None:
     spot = ask(page, "swarmscope.robotScreenPosition(arguments[0])", robot)
     click_at(page, spot["x"], spot["y"])
     wait_for(lambda: ask(page, "swarmscope.selected()") == robot)
+
+
+def test_the_selected_robots_map_and_way_are_drawn(browser: Any, folder: Path) -> None:
+    corner = np.array([[80.0, 0.0], [80.0, 40.0]])
+    toggled = [np.array([[0, k, 20] for k in range(200)], np.int16), np.array([[1, 4, k] for k in range(9)], np.int16)]
+    moments = [Moment(10 * k, 0, True, toggled[k], corner[: k + 1], (1.0, 1.0, 0.1)) for k in range(2)]
+    browser.get("about:blank")
+    browser.get(write_replay(folder, Memories(0.0625, moments)).as_uri())
+    wait_for(lambda: ask(browser, "!!window.swarmscope"))
+    seek(browser, 8.0)
+
+    def picture() -> str:
+        time.sleep(0.15)
+        found: str = ask(browser, "document.getElementById('view').toDataURL()")
+        return found
+
+    browser.execute_script("swarmscope.select(0)")
+    drawn = picture()
+    find(browser, "show-memory").click()
+    assert picture() != drawn
+    find(browser, "show-memory").click()
+    assert picture() == drawn
+    seek(browser, 0.5)  # back in time: the first moment only
+    assert picture() != drawn
+    seek(browser, 8.0)
+    assert picture() == drawn
+    assert [entry for entry in browser.get_log("browser") if entry["level"] in ("SEVERE", "WARNING")] == []
 
 
 def test_play_and_pause(page: Any) -> None:

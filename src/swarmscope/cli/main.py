@@ -237,22 +237,49 @@ def perceive(
     perceive_command(scans, out, Ask(topic, every, fov, first), use)
 
 
-@app.command(epilog="Example: [bold]swarmscope replay runs/first --open[/bold]")
+@app.command(
+    epilog="Examples:\n\n"
+    "[bold]swarmscope replay runs/first --open[/bold]\n\n"
+    "[bold]swarmscope replay runs/office --memory[/bold]"
+)
 def replay(
     run_dir: Annotated[Path, typer.Argument(help="A run folder.")],
     open_: Annotated[bool, typer.Option("--open", help="Open the page in the browser.")] = False,
     close: Close = False,
+    memory: Annotated[
+        bool, typer.Option("--memory", help="With the maps and ways of robots that remember: plays the run again.")
+    ] = False,
+    no_code: NoCode = False,
 ) -> None:
     """Make the replay page and the picture of a run folder anew."""
+    from swarmscope.cli.memory import remembered
     from swarmscope.user_files import whole_path
     from swarmscope.viewing.pictures import write_picture
     from swarmscope.viewing.replay import write_replay
 
-    page = write_replay(run_dir)
+    page = write_replay(run_dir, remembered(run_dir, not no_code) if memory else None)
     typer.echo(str(write_picture(run_dir, close)))
     typer.echo(str(page))
     if open_:
         typer.launch(whole_path(page).as_uri())
+
+
+@app.command(
+    epilog="Examples:\n\n"
+    "[bold]swarmscope memory runs/office[/bold]\n\n"
+    "[bold]swarmscope memory runs/office --robot 2 --number 3 --out turned-back.png[/bold]"
+)
+def memory(
+    run_dir: Annotated[Path, typer.Argument(help="A run folder of a planner that keeps a map, such as atlas.")],
+    robot: Annotated[int | None, typer.Option(help="Whose search, else anybody's.")] = None,
+    number: Annotated[int, typer.Option(min=1, help="1: the search that changed the way most, 2: the next one.")] = 1,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="PNG file, else memory.png in the folder.")] = None,
+    no_code: NoCode = False,
+) -> None:
+    """Play a run again and draw what a robot knew, and which way it meant to go, before and after a search."""
+    from swarmscope.cli.memory import memory_command
+
+    memory_command(run_dir, robot, number, out, not no_code)
 
 
 @app.command(

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from swarmscope.sim.world import WALL_M
+from swarmscope.viewing.memories.again import Memories
 from swarmscope.viewing.run_data import (
     ONLY_WHERE_THINGS_MOVE,
     Array,
@@ -52,25 +53,26 @@ _TYPES = {
     "disc_xy_m": "<f4",
     "door_closed": "u1",
 }
+_MEMORY_TYPES = {"memory_moments": "<i4", "memory_frames": "<f4", "memory_toggled": "<i2", "memory_ways": "<f4"}
 """How each array of the trajectory is stored in the page."""
 
 
-def write_replay(run_dir: Path) -> Path:
+def write_replay(run_dir: Path, memories: Memories | None = None) -> Path:
     """Write ``replay.html`` into the run folder and return its path."""
     run = load_run(run_dir)
-    return replace_file(run.folder / "replay.html", render_page(run).encode("utf-8"))
+    return replace_file(run.folder / "replay.html", render_page(run, memories).encode("utf-8"))
 
 
-def render_page(run: RunData) -> str:
-    """Return the replay page of a run."""
+def render_page(run: RunData, memories: Memories | None = None) -> str:
+    """Return the replay page of a run, with what its robots remembered if that is given."""
     template = resources.files("swarmscope.viewing").joinpath("replay_template.html").read_text("utf-8")
-    payload = json.dumps(page_data(run), allow_nan=False, separators=(",", ":"), ensure_ascii=False)
+    payload = json.dumps(page_data(run, memories), allow_nan=False, separators=(",", ":"), ensure_ascii=False)
     head, tail = template.split("@DATA@")
     head = head.replace("@TITLE@", html.escape(headline(run)))
     return head + payload.replace("<", "\\u003c") + tail
 
 
-def page_data(run: RunData) -> dict[str, Any]:
+def page_data(run: RunData, memories: Memories | None = None) -> dict[str, Any]:
     """Return what the page is given, ready for JSON: names and the world in clear, arrays as base64."""
     trajectory = run.trajectory
     stride = scan_stride(run)
@@ -93,12 +95,30 @@ def page_data(run: RunData) -> dict[str, Any]:
         "range_max_m": float(trajectory.range_max_m),
         "scan_stride": stride,
         "crash_ticks": crash_ticks(trajectory).tolist(),
-        "arrays": {
+        "memory_cell_m": None if memories is None else memories.cell_m,
+        "arrays": _memory_arrays(memories)
+        | {
             name: _encode(arrays[name], kind)
             for name, kind in _TYPES.items()
             if name not in ONLY_WHERE_THINGS_MOVE or arrays[name].size
         },
     }
+
+
+def _memory_arrays(memories: Memories | None) -> dict[str, Any]:
+    """Return what robots remembered: for each moment its tick, robot, whether it had searched, how many cells are
+    toggled and how many corners its way has; and all these in a row."""
+    if memories is None or not memories.moments:
+        return {}
+    moments = memories.moments
+    columns = [(one.tick, one.robot, one.searched, len(one.toggled), len(one.way)) for one in moments]
+    found = {
+        "memory_moments": np.array(columns),
+        "memory_frames": np.array([one.frame for one in moments]),
+        "memory_toggled": np.concatenate([one.toggled for one in moments]),
+        "memory_ways": np.concatenate([one.way for one in moments]),
+    }
+    return {name: _encode(found[name], kind) for name, kind in _MEMORY_TYPES.items()}
 
 
 def scan_stride(run: RunData) -> int:

@@ -1,0 +1,46 @@
+"""``swarmscope memory``, and the maps in ``swarmscope replay --memory``."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from swarmscope.cli._code import announce, files_of, refuse_code
+from swarmscope.errors import ConfigError
+from swarmscope.experiments.warm_up import COMPILING, kernels_are_cold
+from swarmscope.viewing.bag.make import scenario_of
+from swarmscope.viewing.memories.again import Memories, play_for_memories
+from swarmscope.viewing.memories.picture import turn_png, turns_of
+from swarmscope.viewing.progress import QUIET_S, progress_bar
+from swarmscope.viewing.run_data import load_run, replace_file
+
+PICTURE = "memory.png"
+
+
+def remembered(run_dir: Path, code: bool) -> Memories:
+    """Play a run again; return what its robots remembered."""
+    found, scenario = load_run(run_dir), scenario_of(run_dir)
+    files = files_of([scenario])
+    if not code:
+        refuse_code(files)
+    announce(files)
+    if kernels_are_cold(scenario.planner.name):
+        print(COMPILING, file=sys.stderr)
+    with progress_bar(scenario, QUIET_S) as progress:
+        return play_for_memories(found, scenario, progress)
+
+
+def memory_command(run_dir: Path, robot: int | None, rank: int, out: Path | None, code: bool) -> None:
+    """Draw what a robot knew before and after a search."""
+    found = load_run(run_dir)
+    ids = [one.id for one in found.world.robots]
+    if robot is not None and robot not in ids:
+        raise ConfigError("--robot", f"{robot}: this run has robots {ids[0]} to {ids[-1]}")
+    memories = remembered(run_dir, code)
+    turns = turns_of(memories, None if robot is None else ids.index(robot))
+    if not 1 <= rank <= len(turns):
+        raise ConfigError("--number", f"{rank}: there are {len(turns)} searches to draw")
+    turn = turns[rank - 1]
+    when = found.trajectory.t_s[turn.after.tick]
+    print(f"robot {ids[turn.after.robot]} at {when:.1f} s: the new way is {turn.apart_m:.1f} m off the old one")
+    print(replace_file(out or found.folder / PICTURE, turn_png(found, memories, turn)))
