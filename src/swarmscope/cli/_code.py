@@ -26,3 +26,11 @@ def announce(files: list[Path]) -> None:
     """Say which files with code of users are run."""
     for file in files:
         print(f"runs the code in {file}", file=sys.stderr)
+
+
+def allow_code(scenarios: Iterable[Scenario], code: bool) -> None:
+    """Say which files with code of users will be run for some scenarios; refuse them unless ``code``."""
+    files = files_of(scenarios)
+    if not code:
+        refuse_code(files)
+    announce(files)

@@ -20,7 +20,7 @@ from swarmscope.barn.rules import scenario_of
 from swarmscope.barn.runs import Choice, Played, play_all
 from swarmscope.barn.summary import Pair, Row, as_dict, pairs_of, rows_of
 from swarmscope.barn.worlds import Worlds, chosen, find_worlds
-from swarmscope.cli._code import announce, files_of, refuse_code
+from swarmscope.cli._code import allow_code
 from swarmscope.cli._console import PlainConsole
 from swarmscope.errors import ConfigError
 from swarmscope.experiments.seeds import seed_set
@@ -210,10 +210,7 @@ def _check(worlds: Worlds, number: int, choices: Sequence[Choice], changes: Sequ
     """Raise an error before anything is run: in keys, users' files, or libraries of planners."""
     world = worlds.read(number)
     scenarios: list[Scenario] = [scenario_of(world, *choice, changes) for choice in choices]
-    files = files_of(scenarios)
-    if not code:
-        refuse_code(files)
-    announce(files)
+    allow_code(scenarios, code)
     for scenario in scenarios:
         planner_of(scenario.planner).check_available()
 

@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.progress import BarColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
-from swarmscope.cli._code import announce, files_of, refuse_code
+from swarmscope.cli._code import allow_code
 from swarmscope.cli._console import PlainConsole
 from swarmscope.errors import ConfigError, MissingExtraError
 from swarmscope.learning.generate import DRIVEN, PLACED, generate, totals, verify
@@ -251,10 +251,7 @@ def decisions_command(run: Path, numbers: Sequence[int], count: int, out: Path, 
 
     _need("onnx", "onnxruntime")
     found, scenario = load_run(run), scenario_of(run)
-    files = files_of([scenario])
-    if not code:
-        refuse_code(files)
-    announce(files)
+    allow_code([scenario], code)
     with _bar() as bar:
         bar.add_task("plays the run again", total=None, note="")
         points = key_points(found, scenario)

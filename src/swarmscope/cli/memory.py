@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from swarmscope.cli._code import announce, files_of, refuse_code
+from swarmscope.cli._code import allow_code
 from swarmscope.errors import ConfigError
 from swarmscope.experiments.warm_up import COMPILING, kernels_are_cold
 from swarmscope.viewing.bag.make import scenario_of
@@ -20,10 +20,7 @@ PICTURE = "memory.png"
 def remembered(run_dir: Path, code: bool) -> Memories:
     """Play a run again; return what its robots remembered."""
     found, scenario = load_run(run_dir), scenario_of(run_dir)
-    files = files_of([scenario])
-    if not code:
-        refuse_code(files)
-    announce(files)
+    allow_code([scenario], code)
     if kernels_are_cold(scenario.planner.name):
         print(COMPILING, file=sys.stderr)
     with progress_bar(scenario, QUIET_S) as progress:
