@@ -1,8 +1,9 @@
-"""What robots remembered, played again: maps lie where things stand, ways lead to goals, pictures and page show both."""
+"""What robots remembered, played again: maps lie where things stand, ways end at goals, picture and page show it."""
 
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -45,9 +46,8 @@ def places_of(memories, moment):
 
 
 def off_the_pocket(x, y):
-    legs = zip(POCKET, POCKET[1:], strict=False)
     gaps = []
-    for (ax, ay), (bx, by) in legs:
+    for (ax, ay), (bx, by) in pairwise(POCKET):
         t = min(1.0, max(0.0, ((x - ax) * (bx - ax) + (y - ay) * (by - ay)) / math.dist((ax, ay), (bx, by)) ** 2))
         gaps.append(math.hypot(x - ax - t * (bx - ax), y - ay - t * (by - ay)))
     return min(gaps)

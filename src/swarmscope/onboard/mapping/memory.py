@@ -96,8 +96,10 @@ MAP = np.dtype(
         ("arrived", np.uint8),
         # a robot that does not get away from where it is
         ("comes_s", np.float64),  # when somebody last came towards it
-        ("held_u", np.float64),
-        ("held_v", np.float64),
+        ("gives_s", np.float32),  # since when it waits before a narrow place
+        ("gave_s", np.float32),  # when it last did
+        ("held_u", np.float32),
+        ("held_v", np.float32),
         ("held_s", np.float64),
         ("leave_s", np.float64),  # until when it leaves along the longest corridor
         ("leave", np.float64),  # compass frame [rad]
@@ -112,7 +114,8 @@ def new_memory(robots: int) -> np.ndarray:
     """Return the memory of ``robots`` robots that have seen nothing yet."""
     memory = np.zeros(robots, MAP)
     memory["gone_s"] = NEVER_S
-    memory["comes_s"] = memory["searched_s"] = memory["held_s"] = memory["leave_s"] = NEVER_S
+    for name in ("comes_s", "gives_s", "gave_s", "searched_s", "held_s", "leave_s"):
+        memory[name] = NEVER_S
     return memory
 
 

@@ -15,6 +15,7 @@ from swarmscope._jit import jit_inline, jit_inner
 from swarmscope.bounds import Bounds, Flag, Metres, Seconds
 from swarmscope.geometry import wrap_angle
 from swarmscope.onboard.control.wanting import halt, head_for
+from swarmscope.onboard.deciding import giving_way
 from swarmscope.onboard.deciding.evading import Evading, comes, evade, keep_right
 from swarmscope.onboard.deciding.following import away_from_nearest
 from swarmscope.onboard.deciding.progress import last_speed
@@ -54,6 +55,10 @@ GAP_M = 0.25
 CLOSE_M = 0.4
 """What is so near in the way to the next corner makes a robot ask whether it can get there at all."""
 COMPANY_M = 1.5
+AT_IT_M = 0.3
+"""Who is so near to a narrow place does not wait any more."""
+GAVE_S, GIVE_AGAIN = 1.0, 1.5
+"""A wait goes on when it was interrupted for so long; who has waited long enough does not for half as long again."""
 FARTHEST_M = 500.0
 """A goal that is farther is gone to as if it were so far."""
 REASONS = (
@@ -61,8 +66,9 @@ REASONS = (
     "heads beside the next corner: something is between",
     "no way is open by its map: has forgotten what closed it",
     "has not got away from here: leaves where there is most room",
+    "waits beside a narrow place: somebody comes through",
 )
-R_CORNER, R_BESIDE, R_FORGOT, R_LEAVES = range(FIRST_OWN, FIRST_OWN + 4)
+R_CORNER, R_BESIDE, R_FORGOT, R_LEAVES, R_GIVES_WAY = range(FIRST_OWN, FIRST_OWN + 5)
 
 
 class Params(NamedTuple):
@@ -102,6 +108,8 @@ class Params(NamedTuple):
     """And who passes so near."""
     keep_right: Metres = 5.0
     """Who comes towards us so near makes us keep to the right where it is narrow; 0: never."""
+    give_s: Seconds = 15.0
+    """So long a robot waits before a narrow place for those that come through; 0: never."""
     held_s: Seconds = 3.0
     """A robot that has not moved for so long leaves along the longest corridor."""
     narrow_s: Seconds = 4.0
@@ -235,10 +243,49 @@ def _drive(see: View, memory: Row, params: Params, here: Spot, forgot: int) -> N
             memory["comes_s"] = see.percept["now_s"]
         if see.percept["now_s"] - memory["comes_s"] < 2.0:
             bearing = keep_right(see, bearing)
+    bearing, speed, waits = _give_way(see, memory, params, here, (bearing, speed))
+    if waits:
+        reason = R_GIVES_WAY
     if see.percept["now_s"] - memory["held_s"] < 0.9 * params.held_s:
         bearing, speed = evade(see, bearing, speed, params.still_s, _manner(params))
     head_for(see, bearing, speed)
     see.out["state"], see.out["reason"], see.out["side"] = state, reason, 0
+
+
+@jit_inner
+def _give_way(
+    see: View, memory: Row, params: Params, here: Spot, wanted: tuple[float, float]
+) -> tuple[float, float, bool]:
+    """Return the heading and speed of a robot that waits while somebody comes through a narrow place ahead, or those
+    that are ``wanted``; and whether it waits.
+
+    It waits where it can get out of the others' way only, and `GIVE_AGAIN` times ``give_s`` later it may do so again:
+    nobody waits for ever.
+    """
+    now = see.percept["now_s"]
+    waited = now - memory["gives_s"]
+    if params.give_s <= 0.0 or not _has_company(see):
+        return wanted[0], wanted[1], False
+    if waited > GIVE_AGAIN * params.give_s or now - memory["gave_s"] > GAVE_S:
+        memory["gives_s"], waited = now, 0.0
+    if waited > params.give_s:
+        memory["gave_s"] = now
+        return wanted[0], wanted[1], False
+    size = see.rig.body.radius_m / giving_way.OF_M
+    place = giving_way.narrow_ahead(memory, here, params.cell_m, size)
+    if place.far_m < AT_IT_M * size or not giving_way.comes_through(see, place, params.still_s):
+        return wanted[0], wanted[1], False
+    side = giving_way.SIDE_M * size / params.cell_m
+    if now - memory["gave_s"] > GAVE_S and not giving_way.has_room_aside(memory, here, place, side):
+        return wanted[0], wanted[1], False
+    memory["gave_s"] = memory["held_s"] = now
+    x, y = giving_way.where_to_wait(place, size)
+    far = math.sqrt(x * x + y * y)
+    bearing = wrap_angle(math.atan2(y, x) - see.percept["compass"])
+    free = corridor_length(see.masked, see.rig, bearing, see.rig.body.radius_m + params.room_m, min(far, 0.5))
+    if far <= 0.0 or free < min(far, 0.3):
+        return wanted[0], 0.0, True
+    return bearing, min(wanted[1], far), True
 
 
 class Gap(NamedTuple):
