@@ -18,9 +18,9 @@ REACH_M = 2.5
 """Narrow places are looked for so far ahead."""
 STEP_M, SIDE_M = 0.2, 0.125
 """Between the places on the way at which its width is looked at, and between those to its sides."""
-SIDES, NARROW_PLACES = 6, 6
-"""A place is narrow where the robot's middle can be at fewer places across the way, of which so many are looked at on
-either side."""
+ASIDE, NARROW_PLACES = 6, 6
+"""So many places to either side of the way are looked at, up to the first that is not free; it is narrow where fewer of
+them all are free than that. Who is to wait needs as many to the right."""
 IN_M = 0.45
 """Who is so near to the middle of a narrow place is in it."""
 TOWARDS_MPS = 0.1
@@ -68,7 +68,7 @@ def _is_narrow(memory: Row, u: float, v: float, nu: float, nv: float) -> bool:
     """Tell whether a place has little room to its sides, (nu, nv) being a step to the left [cells]."""
     count = 1
     for side in range(-1, 2, 2):
-        for k in range(1, SIDES + 1):
+        for k in range(1, ASIDE + 1):
             if not fits(memory, u + side * k * nu, v + side * k * nv):
                 break
             count += 1
@@ -85,9 +85,9 @@ def has_room_aside(memory: Row, here: Spot, place: Narrow, side: float) -> bool:
     """
     nu, nv = place.dy * side, -place.dx * side
     free = 0
-    while free < SIDES and fits(memory, here.u + (free + 1) * nu, here.v + (free + 1) * nv):
+    while free < ASIDE and fits(memory, here.u + (free + 1) * nu, here.v + (free + 1) * nv):
         free += 1
-    return free == SIDES
+    return free == ASIDE
 
 
 @jit

@@ -37,6 +37,8 @@ MOST_RETURNS, RETURNS_S = 2, 120.0
 """A cell that was cleared so often within so long stays when it comes back."""
 HIDDEN_M = 0.1
 """What is behind a hit is hidden when beams so far beside it do not get there either."""
+CROWD = 5
+"""Of so many neighbours in sight there may be more than are reported."""
 EVERY = 4
 """A cell is looked at for being passed in one tick of so many."""
 
@@ -57,6 +59,7 @@ def learn(see: View, memory: Row, cell_m: float, deep_m: float, cautious: bool) 
     if rig.sensor.field > 0:
         first, last = shared["view_first"], shared["view_last"]
     was_x, was_y = -(2**40), -(2**40)
+    told_m = _told_m(see)
     for n in range(first, last + 1):
         r = see.masked[n]
         if not (rig.sensor.range_min <= r < rig.sensor.range_max) or see.unseen[n] != 0:
@@ -67,11 +70,25 @@ def learn(see: View, memory: Row, cell_m: float, deep_m: float, cautious: bool) 
         if (ix == was_x and iy == was_y) or _on_standing(memory, hu, hv, rig.footprint / cell_m):
             continue
         was_x, was_y = ix, iy
+        if r > told_m and not (is_near(memory, ix, iy) and is_set(memory, ix, iy)):
+            continue
         _hit(memory, here, ix, iy)
         if deep_m > 0.0 and (r > CLEARS_WITHIN_M or _is_hidden(see, n, r + deep_m)):
             _hit(memory, here, int(math.floor(hu + deep_m * eu)), int(math.floor(hv + deep_m * ev)))
     _clear_passed(see, memory, cell_m, cautious)
     memory["ticks"] += 1
+
+
+@jit_inner
+def _told_m(see: View) -> float:
+    """Return how far away [m] what is seen can be told from robots: in a crowd only the nearest are reported."""
+    percept, far = see.percept, 0.0
+    if percept["n_neighbours"] < CROWD:
+        return math.inf
+    for k in range(percept["n_neighbours"]):
+        x, y = percept["neighbour_x"][k], percept["neighbour_y"][k]
+        far = max(far, math.sqrt(x * x + y * y))
+    return far - see.rig.body.radius_m
 
 
 @jit_inline
