@@ -39,6 +39,9 @@ HIDDEN_M = 0.1
 """What is behind a hit is hidden when beams so far beside it do not get there either."""
 CROWD = 5
 """Of so many neighbours in sight there may be more than are reported."""
+BESIDE_M = 0.15
+"""Returns so much farther or nearer than those beside them are of something else; what is wider than a robot by so much
+is none."""
 EVERY = 4
 """A cell is looked at for being passed in one tick of so many."""
 
@@ -70,7 +73,7 @@ def learn(see: View, memory: Row, cell_m: float, deep_m: float, cautious: bool) 
         if (ix == was_x and iy == was_y) or _on_standing(memory, hu, hv, rig.footprint / cell_m):
             continue
         was_x, was_y = ix, iy
-        if r > told_m and not (is_near(memory, ix, iy) and is_set(memory, ix, iy)):
+        if r > told_m and not (is_near(memory, ix, iy) and is_set(memory, ix, iy)) and _may_be_robot(see, n):
             continue
         _hit(memory, here, ix, iy)
         if deep_m > 0.0 and (r > CLEARS_WITHIN_M or _is_hidden(see, n, r + deep_m)):
@@ -89,6 +92,24 @@ def _told_m(see: View) -> float:
         x, y = percept["neighbour_x"][k], percept["neighbour_y"][k]
         far = max(far, math.sqrt(x * x + y * y))
     return far - see.rig.body.radius_m
+
+
+@jit_inner
+def _may_be_robot(see: View, n: int) -> bool:
+    """Tell whether what beam n hits is no wider than a robot, as far as returns lie close to one another."""
+    wide, r = 0.0, see.masked[n]
+    most = 2.0 * see.rig.body.radius_m + BESIDE_M
+    for side in range(-1, 2, 2):
+        k, here, there = n, r, True
+        while there and wide <= most:
+            k, there = _wrapped(see, k + side)
+            if not there:
+                break
+            step = here * see.rig.sensor.increment
+            there = see.unseen[k] == 0 and abs(see.masked[k] - here) < BESIDE_M
+            here = see.masked[k]
+            wide += step if there else 0.0
+    return bool(wide <= most)
 
 
 @jit_inline
