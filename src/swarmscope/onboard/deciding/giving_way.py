@@ -24,6 +24,9 @@ them all are free than that. Who is to wait needs as many to the right."""
 IN_M = 0.45
 """Who is so near to the middle of a narrow place is in it."""
 TOWARDS_MPS = 0.1
+FACES, HELD_S = -0.5, 30.0
+"""Who faces against the way by an angle with less than this cosine, and has stood for less than so long, wants to come
+through; who has stood for longer has parked."""
 LANE_M, BEFORE_M = 0.75, 0.7
 """Who waits does so this far beside the way through, and no nearer to the narrow place."""
 WITHIN_M = 0.15
@@ -92,16 +95,23 @@ def has_room_aside(memory: Row, here: Spot, place: Narrow, side: float) -> bool:
 
 @jit
 def comes_through(see: View, place: Narrow, still_s: float) -> bool:
-    """Tell whether somebody is in a narrow place and comes towards us."""
+    """Tell whether somebody is in a narrow place and comes towards us, or wants to: stands there and faces us."""
     shared, size = see.shared, see.rig.body.radius_m / OF_M
     for t in range(PEERS):
-        if not moves(see.percept, shared, t, still_s):
+        if shared["track_id"][t] < 0:
             continue
         x, y = shared["track_x"][t] - place.x, shared["track_y"][t] - place.y
         along, beside = x * place.dx + y * place.dy, x * place.dy - y * place.dx
-        towards = -(shared["track_vx"][t] * place.dx + shared["track_vy"][t] * place.dy)
-        if towards > TOWARDS_MPS and abs(beside) < LANE_M * size and abs(along) < IN_M * size:
-            return True
+        if not (abs(beside) < LANE_M * size and abs(along) < IN_M * size):
+            continue
+        if moves(see.percept, shared, t, still_s):
+            towards = -(shared["track_vx"][t] * place.dx + shared["track_vy"][t] * place.dy)
+            if towards > TOWARDS_MPS:
+                return True
+        elif moves(see.percept, shared, t, HELD_S):
+            yaw = shared["track_yaw"][t]
+            if math.cos(yaw) * place.dx + math.sin(yaw) * place.dy < FACES:
+                return True
     return False
 
 
