@@ -46,6 +46,8 @@ def one(job: tuple[str, int, tuple[str, ...]]) -> Found:
     for change in changes:
         set_key(values, change)
     scenario = parse_scenario(values, "alone")
+    if len(np.unique(scenario.radii_m)) > 1:
+        raise SystemExit("robots of different sizes cannot be compared with one alone")
     setup = make_setup(scenario)
     references = reference_ways(setup, scenario.radii_m)
     every = run(judged_setting(scenario, setup)).robots
@@ -82,6 +84,8 @@ def row(task: str, found: list[Found]) -> str:
             stretches.append((sums[0] / sums[2], sums[1] / sums[2]))
             ratios.append(sums[0] / sums[1])
             last.append(world.together_s[both].max() / world.alone_s[both].max())
+    if not ratios:
+        return f"| {task} ({len(found)}) | nobody arrived both ways |"
     robots = sum(len(world.together_s) for world in found)
     cells = [
         f"{sum(int(np.isfinite(part).sum()) for part in parts)} of {robots}"

@@ -33,11 +33,16 @@ def memory_command(run_dir: Path, robot: int | None, rank: int, out: Path | None
     ids = [one.id for one in found.world.robots]
     if robot is not None and robot not in ids:
         raise ConfigError("--robot", f"{robot}: this run has robots {ids[0]} to {ids[-1]}")
+    picture = out or found.folder / PICTURE
+    if picture.suffix.lower() != ".png" or not picture.parent.is_dir():
+        raise ConfigError("--out", f"{picture}: must be a .png in a folder that exists")
     memories = remembered(run_dir, code)
     turns = turns_of(memories, None if robot is None else ids.index(robot))
+    if not turns:
+        raise ConfigError(str(run_dir), "nobody searched a second time in this run")
     if not 1 <= rank <= len(turns):
         raise ConfigError("--number", f"{rank}: there are {len(turns)} searches to draw")
     turn = turns[rank - 1]
     when = found.trajectory.t_s[turn.after.tick]
     print(f"robot {ids[turn.after.robot]} at {when:.1f} s: the new way is {turn.apart_m:.1f} m off the old one")
-    print(replace_file(out or found.folder / PICTURE, turn_png(found, memories, turn)))
+    print(replace_file(picture, turn_png(found, memories, turn)))

@@ -114,6 +114,36 @@ def test_what_fills_a_part_of_a_cell_is_not_cleared_by_the_beams_beside_it():
     assert is_set(bot.memory, *cell(1.505, 0.03))
 
 
+def crowd(bot, neighbours):
+    """Let so many robots be reported, the farthest 2 m away."""
+    bot.fill(n_neighbours=neighbours)
+    for k in range(neighbours):
+        bot.percept["neighbour_x"][k], bot.percept["neighbour_y"][k] = -2.0 + 0.2 * k, 0.0
+
+
+@pytest.mark.parametrize(("neighbours", "x", "radius", "learnt"), [
+    (4, 4.0, 0.15, True),  # all that are in sight are reported
+    (5, 4.0, 0.15, False),  # may be one more
+    (5, 1.5, 0.15, True),  # would have been reported
+    (5, 4.0, 0.6, True),  # wider than a robot
+])  # fmt: skip
+def test_in_a_crowd_what_may_be_an_unreported_robot_is_not_learnt(neighbours, x, radius, learnt):
+    bot = robot()
+    crowd(bot, neighbours)
+    look(bot, scan_at(circles_world([(x, 0.03, radius)]), RIG))
+    assert bool(bot.memory["fine"].any()) == learnt
+
+
+def test_in_a_crowd_what_is_known_stays_known():
+    bot = robot()
+    scan = scan_at(circles_world([(1.9, 0.03, 0.15)]), RIG)
+    look(bot, scan)
+    before = bot.memory["fine"].copy()
+    crowd(bot, 5)
+    look(bot, scan, times=5)
+    assert (bot.memory["fine"] & before == before).all()
+
+
 def test_naive_clearing_takes_a_post_away_when_a_beam_passes_it():
     """What the ablation is to show: the middle of the cell is passed, though something stands in it."""
     bot = robot()

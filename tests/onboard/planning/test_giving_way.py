@@ -92,6 +92,7 @@ def test_who_stands_in_it_and_faces_us_wants_to_come_through(yaw, comes):
         (Narrow(0.0, 1.5, 0.0, 1.0, 1.5), (LANE_M, 0.0)),  # the right of a way to the left is ahead
         (Narrow(1.5, 0.7, 1.0, 0.0, 1.6), (0.0, 0.0)),  # well on the right already
         (Narrow(1.5, -0.8, 1.0, 0.0, 1.7), (0.0, 0.0)),  # or on the left
+        (Narrow(1.0, 1.0, -1.0, 0.0, 3.0), (0.0, 0.0)),  # round a bend, behind a wall
     ],
 )
 def test_where_one_waits(place, where):

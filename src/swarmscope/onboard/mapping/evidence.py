@@ -84,21 +84,24 @@ def learn(see: View, memory: Row, cell_m: float, deep_m: float, cautious: bool) 
 
 @jit_inner
 def _told_m(see: View) -> float:
-    """Return how far away [m] what is seen can be told from robots: in a crowd only the nearest are reported."""
+    """Return how far away [m] what is seen can be told from robots.
+
+    Only the nearest are reported, and where many are in sight more may be: a guess, `CROWD`, since nobody counts them.
+    """
     percept, far = see.percept, 0.0
     if percept["n_neighbours"] < CROWD:
         return math.inf
     for k in range(percept["n_neighbours"]):
         x, y = percept["neighbour_x"][k], percept["neighbour_y"][k]
         far = max(far, math.sqrt(x * x + y * y))
-    return far - see.rig.body.radius_m
+    return far - see.rig.guarding.others_largest_m
 
 
 @jit_inner
 def _may_be_robot(see: View, n: int) -> bool:
     """Tell whether what beam n hits is no wider than a robot, as far as returns lie close to one another."""
     wide, r = 0.0, see.masked[n]
-    most = 2.0 * see.rig.body.radius_m + BESIDE_M
+    most = 2.0 * see.rig.guarding.others_largest_m + BESIDE_M
     for side in range(-1, 2, 2):
         k, here, there = n, r, True
         while there and wide <= most:
@@ -253,6 +256,8 @@ def _is_crossed(see: View, du: float, dv: float, cell_m: float) -> bool:
     sensor = see.rig.sensor
     n, there = _wrapped(see, int(round((rough_angle(x, y + 1e-12) - sensor.angle_min) / sensor.increment)))
     behind = cell_m * (math.sqrt(du * du + dv * dv) + 0.5)
+    if sensor.field > 0 and not see.shared["view_first"] <= n <= see.shared["view_last"]:
+        return False
     return there and see.unseen[n] == 0 and behind < sensor.range_max and bool(see.scan[n] >= behind)
 
 

@@ -19,16 +19,21 @@ LOST_S, MOST_DOUBLINGS = 15.0, 5
 
 @jit
 def keep(memory: Row, place: Spot, r: float, until_s: float) -> None:
-    """Keep ``r`` [cells] off a place until then; where there are too many, the one that ends first is given up."""
-    at = memory["kept_n"]
+    """Keep ``r`` [cells] off a place until then; where there are too many, the one that ends first is given up.
+
+    A place that is kept already is kept no shorter and no closer than it was.
+    """
+    at, same = memory["kept_n"], False
     for k in range(memory["kept_n"]):
         if (memory["kept_u"][k] - place.u) ** 2 + (memory["kept_v"][k] - place.v) ** 2 < SAME * SAME:
-            at = k
+            at, same = k, True
     if at == KEPT:
         at = 0
         for k in range(KEPT):
             if memory["kept_s"][k] < memory["kept_s"][at]:
                 at = k
+    if same:
+        r, until_s = max(r, memory["kept_r"][at]), max(until_s, memory["kept_s"][at])
     memory["kept_n"] = max(memory["kept_n"], at + 1)
     memory["kept_u"][at], memory["kept_v"][at], memory["kept_r"][at] = place.u, place.v, r
     memory["kept_s"][at] = until_s

@@ -25,7 +25,7 @@ from swarmscope.onboard.mapping.kept import SAME, keep, lose_sight, review
 from swarmscope.onboard.mapping.memory import MAP, new_memory
 from swarmscope.onboard.mapping.way import START_WITHIN, find_shorter, forget_and_find, is_on_way, nearest_open, shorten
 from swarmscope.onboard.mapping.words import Spot, number
-from swarmscope.onboard.percept import PEERS, Row
+from swarmscope.onboard.percept import NEVER_S, PEERS, Row
 from swarmscope.onboard.perception.corridor import corridor_length
 from swarmscope.onboard.perception.safety import safe_directions
 from swarmscope.onboard.reasons import (
@@ -264,19 +264,20 @@ def _give_way(
     """
     now = see.percept["now_s"]
     waited = now - memory["gives_s"]
-    if params.give_s <= 0.0 or not _has_company(see):
+    size = see.rig.body.radius_m / giving_way.OF_M
+    if params.give_s <= 0.0 or not _has_company(see, COMPANY_M * size):
         return wanted[0], wanted[1], False
-    if waited > GIVE_AGAIN * params.give_s or now - memory["gave_s"] > GAVE_S:
-        memory["gives_s"], waited = now, 0.0
+    begins = waited > GIVE_AGAIN * params.give_s or now - memory["gave_s"] > GAVE_S
+    if begins:
+        memory["gives_s"], memory["gave_s"], waited = now, NEVER_S, 0.0
     if waited > params.give_s:
         memory["gave_s"] = now
         return wanted[0], wanted[1], False
-    size = see.rig.body.radius_m / giving_way.OF_M
     place = giving_way.narrow_ahead(memory, here, params.cell_m, size)
     if place.far_m < AT_IT_M * size or not giving_way.comes_through(see, place, params.still_s):
         return wanted[0], wanted[1], False
     side = giving_way.SIDE_M * size / params.cell_m
-    if now - memory["gave_s"] > GAVE_S and not giving_way.has_room_aside(memory, here, place, side):
+    if begins and not giving_way.has_room_aside(memory, here, place, side):
         return wanted[0], wanted[1], False
     memory["gave_s"] = memory["held_s"] = now
     x, y = giving_way.where_to_wait(place, size)
@@ -298,11 +299,11 @@ class Gap(NamedTuple):
 
 
 @jit_inner
-def _has_company(see: View) -> bool:
+def _has_company(see: View, within: float) -> bool:
     """Tell whether a neighbour is near: then it is the neighbour that is waited for, and not the gap that is narrow."""
     shared = see.shared
     for t in range(PEERS):
-        if shared["track_id"][t] >= 0 and shared["track_x"][t] ** 2 + shared["track_y"][t] ** 2 < COMPANY_M * COMPANY_M:
+        if shared["track_id"][t] >= 0 and shared["track_x"][t] ** 2 + shared["track_y"][t] ** 2 < within * within:
             return True
     return False
 
@@ -314,7 +315,7 @@ def _watch_gap(see: View, memory: Row, params: Params, gap: Gap) -> None:
     if not (gap.is_blocked and gap.free_m < CLOSE_M):
         memory["beside_s"] = max(0.0, memory["beside_s"] - dt)
         return
-    if _has_company(see):
+    if _has_company(see, COMPANY_M):
         return
     memory["beside_s"] += dt
     if memory["beside_s"] < params.narrow_s:

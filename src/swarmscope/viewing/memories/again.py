@@ -47,6 +47,8 @@ class Moment(NamedTuple):
     """(k, 2): the corners still ahead, the goal last [cells]."""
     frame: tuple[float, float, float]
     """Where its map's origin lies in the world, x, y [m], and how the map is turned there [rad]."""
+    place: tuple[float, float] = (0.0, 0.0)
+    """Where it is in its map [cells]."""
 
 
 class Memories(NamedTuple):
@@ -93,7 +95,9 @@ class _Notes:
             if now != before or len(toggled):
                 frame = _frame(sim, self.rows["shared"][i], i)
                 way = np.column_stack([memory["way_u"], memory["way_v"]])[: now[1]]
-                self.moments.append(Moment(tick, i, now[0] != before[0], _unpacked(toggled), way, frame))
+                shared = self.rows["shared"][i]
+                place = float(shared["x"]) / self.cell_m, float(shared["y"]) / self.cell_m
+                self.moments.append(Moment(tick, i, now[0] != before[0], _unpacked(toggled), way, frame, place))
         return False
 
 

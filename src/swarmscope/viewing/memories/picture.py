@@ -92,10 +92,9 @@ def in_world(moment: Moment, cell_m: float, places: Floats) -> Floats:
 
 def _apart(before: Moment, after: Moment, cell_m: float) -> float:
     """Return how far two ways are apart [m]: mean over the places on both of the distance to the other."""
-    start = before.way[:1] if not len(after.way) else after.way[:1]
     if not len(before.way) or not len(after.way):
         return 0.0
-    first, second = (_sampled(np.concatenate([start, one.way])) for one in (before, after))
+    first, second = (_sampled(np.vstack([after.place, one.way])) for one in (before, after))
     gaps = np.hypot(*np.moveaxis(first[:, None] - second[None], 2, 0))
     return float(cell_m * 0.5 * (gaps.min(axis=0).mean() + gaps.min(axis=1).mean()))
 
