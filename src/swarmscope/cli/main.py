@@ -252,12 +252,17 @@ def replay(
     no_code: NoCode = False,
 ) -> None:
     """Make the replay page and the picture of a run folder anew."""
-    from swarmscope.cli.memory import remembered
     from swarmscope.user_files import whole_path
     from swarmscope.viewing.pictures import write_picture
     from swarmscope.viewing.replay import write_replay
 
-    page = write_replay(run_dir, remembered(run_dir, not no_code) if memory else None)
+    memories = None
+    if memory:
+        from swarmscope.cli.memory import remembered
+        from swarmscope.viewing.run_data import load_run
+
+        memories = remembered(load_run(run_dir), not no_code)
+    page = write_replay(run_dir, memories)
     typer.echo(str(write_picture(run_dir, close)))
     typer.echo(str(page))
     if open_:

@@ -12,14 +12,14 @@ from swarmscope.viewing.bag.make import scenario_of
 from swarmscope.viewing.memories.again import Memories, play_for_memories
 from swarmscope.viewing.memories.picture import turn_png, turns_of
 from swarmscope.viewing.progress import QUIET_S, progress_bar
-from swarmscope.viewing.run_data import load_run, replace_file
+from swarmscope.viewing.run_data import RunData, load_run, replace_file
 
 PICTURE = "memory.png"
 
 
-def remembered(run_dir: Path, code: bool) -> Memories:
+def remembered(found: RunData, code: bool) -> Memories:
     """Play a run again; return what its robots remembered."""
-    found, scenario = load_run(run_dir), scenario_of(run_dir)
+    scenario = scenario_of(found.folder)
     allow_code([scenario], code)
     if kernels_are_cold(scenario.planner.name):
         print(COMPILING, file=sys.stderr)
@@ -36,7 +36,7 @@ def memory_command(run_dir: Path, robot: int | None, rank: int, out: Path | None
     picture = out or found.folder / PICTURE
     if picture.suffix.lower() != ".png" or not picture.parent.is_dir():
         raise ConfigError("--out", f"{picture}: must be a .png in a folder that exists")
-    memories = remembered(run_dir, code)
+    memories = remembered(found, code)
     turns = turns_of(memories, None if robot is None else ids.index(robot))
     if not turns:
         raise ConfigError(str(run_dir), "nobody searched a second time in this run")

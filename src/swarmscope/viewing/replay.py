@@ -7,12 +7,11 @@ import html
 import json
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from swarmscope.sim.world import WALL_M
-from swarmscope.viewing.memories.again import Memories
 from swarmscope.viewing.run_data import (
     ONLY_WHERE_THINGS_MOVE,
     Array,
@@ -25,6 +24,9 @@ from swarmscope.viewing.run_data import (
     shown_bounds,
     summary_rows,
 )
+
+if TYPE_CHECKING:
+    from swarmscope.viewing.memories.again import Memories
 
 SCAN_BUDGET_BYTES = 24_000_000
 """Scans and safe directions above this are thinned in time: every 2nd, 3rd, ... tick is kept."""

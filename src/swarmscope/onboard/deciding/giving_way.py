@@ -121,9 +121,8 @@ def where_to_wait(place: Narrow, size: float) -> tuple[float, float]:
     lane, least, within = LANE_M * size, BEFORE_M * size, WITHIN_M * size
     before = place.x * place.dx + place.y * place.dy
     right = place.y * place.dx - place.x * place.dy  # so far to the right of the way through the robot is
-    if before > least - within and (right > lane - within or right < -lane):
-        return 0.0, 0.0
-    if before <= 0.0:  # the way leads back there: no place on this side of it is beside that
+    is_beside = before > least - within and (right > lane - within or right < -lane)
+    if is_beside or before <= 0.0:  # or the way leads back there: no place on this side of it is beside that
         return 0.0, 0.0
     before = max(least, before)
     x = place.x - before * place.dx + lane * place.dy

@@ -153,10 +153,16 @@ def _shift(memory: Row, ex: int, ey: int) -> None:
             set_cell(memory, NODE * kx + 2, NODE * ky + 2)
 
 
+@jit_inline
+def _remembered(memory: Row) -> int:
+    """Return how many nodes away along x or y the place layer is remembered, where not all of it is."""
+    return max(number(memory["forget_n"]), NODES // 2 - RIM)
+
+
 @jit_inner
 def _forget_behind(memory: Row, ex: int, ey: int) -> None:
     """Forget the line of nodes that a step along (ex, ey) leaves farther behind than is remembered."""
-    n = max(number(memory["forget_n"]), NODES // 2 - RIM)
+    n = _remembered(memory)
     x0, y0 = memory["west"] // NODE + NODES // 2, memory["south"] // NODE + NODES // 2
     behind = -n if ex + ey > 0 else n - 1
     for k in range(-n, n):
@@ -167,10 +173,9 @@ def _forget_behind(memory: Row, ex: int, ey: int) -> None:
 @jit_inner
 def _is_forgotten(memory: Row, kx: int, ky: int) -> bool:
     """Tell whether a node is so far away that it is not remembered."""
-    n = number(memory["forget_n"])
-    if n == 0:
+    if memory["forget_n"] == 0:
         return False
-    n = max(n, NODES // 2 - RIM)
+    n = _remembered(memory)
     x, y = kx - memory["west"] // NODE - NODES // 2, ky - memory["south"] // NODE - NODES // 2
     return not (-n <= x < n and -n <= y < n)
 

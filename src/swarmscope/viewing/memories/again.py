@@ -93,9 +93,9 @@ class _Notes:
             toggled = np.setxor1d(self._known.get(i, np.zeros(0, np.int64)), keys, assume_unique=True)
             self._known[i] = keys
             if now != before or len(toggled):
-                frame = _frame(sim, self.rows["shared"][i], i)
-                way = np.column_stack([memory["way_u"], memory["way_v"]])[: now[1]]
                 shared = self.rows["shared"][i]
+                frame = _frame(sim, shared, i)
+                way = np.column_stack([memory["way_u"], memory["way_v"]])[: now[1]]
                 place = float(shared["x"]) / self.cell_m, float(shared["y"]) / self.cell_m
                 self.moments.append(Moment(tick, i, now[0] != before[0], _unpacked(toggled), way, frame, place))
         return False
