@@ -133,6 +133,15 @@ def _ends_before(see: View, n: int, r: float) -> bool:
 
 
 @jit_inline
+def _ends_behind(see: View, n: int, r: float) -> bool:
+    """Tell whether nothing is hit before ``r`` [m] along beam n, as far as that is seen."""
+    n, there = _wrapped(see, n)
+    if not there or see.unseen[n] != 0 or not see.scan[n] >= r:
+        return False
+    return see.rig.sensor.field <= 0 or bool(see.shared["view_first"] <= n <= see.shared["view_last"])
+
+
+@jit_inline
 def _wrapped(see: View, n: int) -> tuple[int, bool]:
     """Return the beam that is meant by a number before the first or after the last, and whether there is one."""
     sensor = see.rig.sensor
@@ -240,10 +249,7 @@ def _is_passed(see: View, du: float, dv: float, cell_m: float) -> bool:
     middle = (rough_angle(x, y + 1e-12) - sensor.angle_min) / sensor.increment
     wide = math.asin(min(1.0, half / max(d, half))) / sensor.increment
     for k in range(int(math.floor(middle - wide)), int(math.ceil(middle + wide)) + 1):
-        n, there = _wrapped(see, k)
-        if not there or see.unseen[n] != 0 or not see.scan[n] >= behind:
-            return False
-        if sensor.field > 0 and not see.shared["view_first"] <= n <= see.shared["view_last"]:
+        if not _ends_behind(see, k, behind):
             return False
     return True
 
@@ -254,11 +260,9 @@ def _is_crossed(see: View, du: float, dv: float, cell_m: float) -> bool:
     c, s = math.cos(see.percept["compass"]), math.sin(see.percept["compass"])
     x, y = c * du + s * dv, c * dv - s * du
     sensor = see.rig.sensor
-    n, there = _wrapped(see, int(round((rough_angle(x, y + 1e-12) - sensor.angle_min) / sensor.increment)))
+    n = int(round((rough_angle(x, y + 1e-12) - sensor.angle_min) / sensor.increment))
     behind = cell_m * (math.sqrt(du * du + dv * dv) + 0.5)
-    if sensor.field > 0 and not see.shared["view_first"] <= n <= see.shared["view_last"]:
-        return False
-    return there and see.unseen[n] == 0 and behind < sensor.range_max and bool(see.scan[n] >= behind)
+    return behind < sensor.range_max and _ends_behind(see, n, behind)
 
 
 @jit_inner
