@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import signal
 import subprocess
 import sys
+import time
 
 import pytest
 from command_line import SMALL, refused, swarmscope
 
+from swarmscope.cli._errors import ctrl_c_is_never_lost
 from swarmscope.errors import InputFileError
 from swarmscope.judging.run_folder import read_metrics
 
@@ -84,3 +87,17 @@ def test_kill_in_the_middle_keeps_the_earlier_run(moment, tmp_path):
     assert python("-c", KILLED, out, moment).returncode == -9
     assert (out / "metrics.json").read_bytes() == before
     assert swarmscope("replay", out).exit_code == 0
+
+
+def test_ctrl_c_counts_even_while_a_finaliser_runs():
+    class Dropped:
+        def __del__(self):
+            signal.raise_signal(signal.SIGINT)
+
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt), ctrl_c_is_never_lost():
+            Dropped()
+            time.sleep(10.0)
+    finally:
+        signal.signal(signal.SIGINT, before)

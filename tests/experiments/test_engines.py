@@ -121,9 +121,9 @@ def test_kill_9_of_everything_loses_only_what_was_under_way(tmp_path, truth):
 
 
 def test_ctrl_c_says_how_to_go_on(tmp_path):
-    # 200 runs are more than end before the signal.
+    # More runs than end before the signal, however late that comes on a busy machine.
     few = {"places": {"near": VALUES["places"]["near"]}, "planners": {"Nav-SCOPE": VALUES["planners"]["Nav-SCOPE"]}}
-    file, path = write_experiment(tmp_path, seeds="1000-1199", sweeps=[], **few), tmp_path / "s.sqlite"
+    file, path = write_experiment(tmp_path, seeds="1000-2999", sweeps=[], **few), tmp_path / "s.sqlite"
     # Where the tests run in the background of a shell, Ctrl-C is ignored, and a process would inherit that.
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     process = start("run", file, path)
@@ -131,7 +131,7 @@ def test_ctrl_c_says_how_to_go_on(tmp_path):
     wait_for(lambda: count(path) >= 2 or process.poll() is not None)
     process.send_signal(signal.SIGINT)
     _, said = process.communicate(timeout=180)
-    assert process.returncode == 130
+    assert process.returncode == 130, said
     assert "finished runs are kept" in said and "Traceback" not in said
     assert count(path) >= 2
 

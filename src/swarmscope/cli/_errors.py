@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import _thread
 import errno
 import os
 import sys
+import threading
 import traceback
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -17,6 +20,7 @@ from swarmscope.errors import SwarmscopeError
 
 FAILED, FAULT, INTERRUPTED = 2, 70, 130
 """What a user can mend, what only we can (EX_SOFTWARE), and Ctrl-C."""
+AGAIN_S = 0.02
 TRACEBACK = "SWARMSCOPE_TRACEBACK"
 """Environment variable: set, an error that nobody thought of is shown in full."""
 
@@ -30,7 +34,8 @@ class PlainErrors(TyperGroup):
         _open_what_is_closed()
         _never_fail_to_print()
         try:
-            result = super().invoke(ctx)
+            with ctrl_c_is_never_lost():
+                result = super().invoke(ctx)
             if sys.stdout is not None:
                 sys.stdout.flush()
         except KeyboardInterrupt as stop:
@@ -44,6 +49,24 @@ class PlainErrors(TyperGroup):
                 raise  # an end, or a wrong option, that the command line's library prints itself
             _end(*_words(error, words))
         return result
+
+
+@contextmanager
+def ctrl_c_is_never_lost() -> Iterator[None]:
+    """Ask again for the end where Python drops a Ctrl-C: while a finaliser or a weak reference's callback runs."""
+    before = sys.unraisablehook
+
+    def again(dropped: Any) -> None:
+        if dropped.exc_type is KeyboardInterrupt:  # later, since it would be dropped here, too
+            threading.Timer(AGAIN_S, _thread.interrupt_main).start()
+        else:
+            before(dropped)
+
+    sys.unraisablehook = again
+    try:
+        yield
+    finally:
+        sys.unraisablehook = before
 
 
 def _words(error: Exception, words: list[str]) -> tuple[str, int]:
