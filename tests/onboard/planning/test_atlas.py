@@ -128,3 +128,9 @@ def test_odometry_that_leaps_costs_the_map_and_no_time(leap):
     bot.fill(odom_x=0.0)
     assert tick(bot)["v"] > 0.0
     assert np.bitwise_count(bot.memory["fine"]).sum() > 20
+
+
+def test_a_robot_finds_back_out_of_where_it_came_in_by_a_narrow_gap():
+    """Rubble on a tuning seed: by its map the gap that it came in by is closed, and its only way leads back through."""
+    values = ATLAS | {"task": {"name": "rubble"}, "seed": 1046, "robots": 1, "limit_s": 600.0}
+    assert run_scenario(values).robots["arrived"].all()

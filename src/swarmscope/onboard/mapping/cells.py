@@ -3,9 +3,9 @@
 *Fine layer*: cells of ``cell_m``, a bit each, in a square of 256 x 256 cells that moves with the robot. Of these it is
 asked whether the robot's disc fits at a place, to a quarter of a cell.
 *Place layer*: all that the square has left behind. A bit for each node of a grid four cells wide says whether the disc
-did not fit there, a second one whether a disc with less room did. It is kept in pages of 64 x 64 nodes that are there
-only where something is; the directory wraps round after 16 pages, so that what lies that far away is forgotten when its
-place is wanted.
+did not fit there, a second one whether the least one did, or the robot's body has been there. It is kept in pages of
+64 x 64 nodes that are there only where something is; the directory wraps round after 16 pages, so that what lies that
+far away is forgotten when its place is wanted.
 
 Unknown is free. All places are in cells. ``memory`` is a robot's row of ``MAP`` (``mapping/memory.py``).
 """
@@ -132,9 +132,12 @@ def _shift(memory: Row, ex: int, ey: int) -> None:
     for k in range(RIM, NODES - RIM):
         kx, ky = (x0 + out, y0 + k) if ex != 0 else (x0 + k, y0 + out)
         fits_here = _any_fits(memory, kx, ky)
-        ask_for(memory, LESS)
-        block(memory, kx, ky, not fits_here, not fits_here and _any_fits(memory, kx, ky))
-        ask_for(memory, FULL)
+        slim = not fits_here and is_slim(memory, kx, ky)
+        if not fits_here and not slim:
+            ask_for(memory, LEAST)
+            slim = _least_fits(memory, kx, ky)
+            ask_for(memory, FULL)
+        block(memory, kx, ky, not fits_here, slim)
     if memory["forget_n"] > 0:
         _forget_behind(memory, ex, ey)
     first = 0 if ex + ey > 0 else NODES - 1  # the line that leaves the layer
@@ -194,6 +197,15 @@ def _any_fits(memory: Row, kx: int, ky: int) -> bool:
         if _disc_fits(memory, NODE * kx + 2 + aside * _BESIDE_X[k], NODE * ky + 2 + aside * _BESIDE_Y[k]):
             return True
     return False
+
+
+@jit_inner
+def _least_fits(memory: Row, kx: int, ky: int) -> bool:
+    """Tell whether a disc with the least room fits at a node or a cell beside it."""
+    found = False
+    for k in range(BESIDE):
+        found = found or _disc_fits(memory, NODE * kx + 2.0 + _BESIDE_X[k], NODE * ky + 2.0 + _BESIDE_Y[k])
+    return found
 
 
 @jit
@@ -318,6 +330,12 @@ def _in_the_way(memory: Row, u: float, v: float) -> bool:
 def is_open(memory: Row, u: float, v: float) -> bool:
     """Tell whether the robot may be at (u, v) by all that it knows."""
     return fits(memory, u, v) and not _in_the_way(memory, u, v)
+
+
+@jit
+def is_seen_open(memory: Row, u: float, v: float) -> bool:
+    """Tell whether the robot may be at (u, v) by the cells of the fine layer alone."""
+    return is_fine(memory, u, v) and _disc_fits(memory, u, v) and not _in_the_way(memory, u, v)
 
 
 @jit_inline

@@ -12,7 +12,6 @@ import math
 from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.geometry import point_segment_distance, rough_angle
 from swarmscope.onboard.mapping.cells import (
-    FULL,
     HALF_DIAGONAL,
     block_round,
     clear_cell,
@@ -186,7 +185,7 @@ def _closes(memory: Row, u: float, v: float, hu: float, hv: float) -> bool:
     au, av = u, v
     for k in range(memory["way_n"]):
         bu, bv = memory["way_u"][k], memory["way_v"][k]
-        if point_segment_distance(hu, hv, au, av, bu, bv) < memory["disc_r"][FULL]:
+        if point_segment_distance(hu, hv, au, av, bu, bv) < memory["disc_r"][memory["way_room"]]:
             return True
         au, av = bu, bv
     return False

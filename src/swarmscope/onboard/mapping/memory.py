@@ -53,7 +53,7 @@ MAP = np.dtype(
         ("gone_at", np.int64),
         ("near_x", np.int64),  # the robot's cell when the square was last moved
         ("near_y", np.int64),
-        ("ticks", np.int64),
+        ("ticks", np.int32),
         # robots that stand for long: not in the map, but in the way
         ("stand_n", np.int64),
         ("stand_u", np.float32, PEERS),  # [cells]
@@ -82,12 +82,16 @@ MAP = np.dtype(
         ("old_v", np.float32, CORNERS),
         ("other_u", np.float32, CORNERS),  # the way that another search has found
         ("other_v", np.float32, CORNERS),
+        ("gone", np.float32),  # how far it has gone [cells]
+        ("gone_u", np.float32),  # where it was when that was last counted [cells]
+        ("gone_v", np.float32),
+        ("straight", np.float32),  # from its first place to the goal [cells]
         ("closed", np.uint8),  # something has been seen in it
         ("opened", np.uint8),  # something is gone that was in the map
         ("searched_s", np.float64),
-        ("searches", np.int64),
-        ("floods", np.int64),
-        ("failures", np.int64),
+        ("searches", np.int32),
+        ("floods", np.int32),
+        ("failures", np.int32),
         ("scratch", np.uint64, SCRATCH),
         ("nodes_n", np.int64),  # of a search
         ("queue_n", np.int64),

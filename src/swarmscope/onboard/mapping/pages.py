@@ -39,7 +39,7 @@ def is_blocked(memory: Row, kx: int, ky: int) -> bool:
 
 @jit
 def is_slim(memory: Row, kx: int, ky: int) -> bool:
-    """Tell whether a disc with less room did fit at node (kx, ky) when the fine layer last left it."""
+    """Tell whether the least disc did fit at node (kx, ky) when the fine layer last left it, or the robot was there."""
     slot = page_of(memory, kx, ky)
     if slot < 0 or memory["slim_at"][slot] == NO_PAGE:
         return False

@@ -10,9 +10,10 @@ from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.geometry import point_segment_distance
 from swarmscope.onboard.mapping.cells import FULL, LEAST, LESS, PHASES, ask_for, forget_all, is_open, open_way
 from swarmscope.onboard.mapping.flood import flood
+from swarmscope.onboard.mapping.kept import give_up_once
 from swarmscope.onboard.mapping.memory import CORNERS
 from swarmscope.onboard.mapping.search import FOUND, TOO_MANY, shortest
-from swarmscope.onboard.mapping.words import Spot
+from swarmscope.onboard.mapping.words import Spot, number
 from swarmscope.onboard.percept import Row
 
 HALVINGS = 4
@@ -35,21 +36,21 @@ GOAL_WITHIN = 8
 def find_way(memory: Row, here: Spot, goal: Spot) -> bool:
     """Search a way; return whether there is one. Where the goal is not open it leads past the nearest open place."""
     memory["searches"] += 1
-    gu, gv = _goal_place(memory, goal.u, goal.v)
-    if not _search(memory, here, Spot(gu, gv)):
+    near = goal_place(memory, goal)
+    if not search_way(memory, here, near):
         memory["failures"] += 1
         return False
     memory["closed"], memory["way_room"] = 0, memory["room"]
     n = memory["way_n"]
-    if gu != goal.u or gv != goal.v:
+    if near.u != goal.u or near.v != goal.v:
         n = min(CORNERS, n + 1)
         memory["way_u"][n - 1], memory["way_v"][n - 1] = goal.u, goal.v
         memory["way_n"] = n
     return True
 
 
-@jit_inner
-def _search(memory: Row, here: Spot, goal: Spot) -> bool:
+@jit
+def search_way(memory: Row, here: Spot, goal: Spot) -> bool:
     """Search, and flood where that takes too many nodes or the way is long: what is found must not depend on which.
 
     A search finds ways between the nodes of the place layer, a flood those over nodes between which no straight way is
@@ -63,14 +64,14 @@ def _search(memory: Row, here: Spot, goal: Spot) -> bool:
         if length <= LONG * straight:
             return True
         n = memory["way_n"]
-        _copy(memory["way_u"], memory["way_v"], memory["other_u"], memory["other_v"], n)
+        copy_way(memory["way_u"], memory["way_v"], memory["other_u"], memory["other_v"], n)
         memory["floods"] += 1
         if flood(memory, here.u, here.v, goal.u, goal.v):
             tighten(memory, here.u, here.v)
             if way_length(memory, here) < length:
                 return True
         memory["way_n"] = n
-        _copy(memory["other_u"], memory["other_v"], memory["way_u"], memory["way_v"], n)
+        copy_way(memory["other_u"], memory["other_v"], memory["way_u"], memory["way_v"], n)
         return True
     reached = False
     for phase in range(PHASES if memory["room"] == FULL else 1):
@@ -98,17 +99,16 @@ def _is_all_open(memory: Row, here: Spot) -> bool:
 
 
 @jit_inline
-def _copy(from_u: np.ndarray, from_v: np.ndarray, to_u: np.ndarray, to_v: np.ndarray, n: int) -> None:
+def copy_way(from_u: np.ndarray, from_v: np.ndarray, to_u: np.ndarray, to_v: np.ndarray, n: int) -> None:
     """Copy the first ``n`` corners of a way."""
     for k in range(n):
         to_u[k], to_v[k] = from_u[k], from_v[k]
 
 
 @jit_inline
-def _goal_place(memory: Row, u: float, v: float) -> tuple[float, float]:
+def goal_place(memory: Row, goal: Spot) -> Spot:
     """Return the goal, or where it is not open the nearest open place to it."""
-    place = nearest_open(memory, Spot(u, v), GOAL_WITHIN)
-    return place.u, place.v
+    return nearest_open(memory, goal, GOAL_WITHIN)
 
 
 @jit
@@ -208,13 +208,16 @@ def find_shorter(memory: Row, here: Spot, goal: Spot, gain: float) -> None:
     Where its first corner is out of sight it is led on to from here: the two ways are compared as both would be gone,
     else a robot between two that are about as long would turn round for ever.
     """
+    room = number(memory["way_room"])
+    ask_for(memory, room)
     _join(memory, here)
+    ask_for(memory, FULL)
     old_length, n = way_length(memory, here), memory["way_n"]
-    _copy(memory["way_u"], memory["way_v"], memory["old_u"], memory["old_v"], n)
+    copy_way(memory["way_u"], memory["way_v"], memory["old_u"], memory["old_v"], n)
     found = find_way(memory, here, goal)
     if not found or way_length(memory, here) > old_length - gain:
-        memory["way_n"] = n
-        _copy(memory["old_u"], memory["old_v"], memory["way_u"], memory["way_v"], n)
+        memory["way_n"], memory["way_room"] = n, room
+        copy_way(memory["old_u"], memory["old_v"], memory["way_u"], memory["way_v"], n)
 
 
 @jit
@@ -224,7 +227,7 @@ def _join(memory: Row, here: Spot) -> None:
     first = Spot(memory["way_u"][0], memory["way_v"][0])
     if open_way(memory, here.u, here.v, first.u, first.v):
         return
-    _copy(memory["way_u"], memory["way_v"], memory["old_u"], memory["old_v"], n)
+    copy_way(memory["way_u"], memory["way_v"], memory["old_u"], memory["old_v"], n)
     found = shortest(memory, here.u, here.v, first.u, first.v)
     if found == TOO_MANY and flood(memory, here.u, here.v, first.u, first.v):
         found = FOUND
@@ -242,7 +245,7 @@ def forget_and_find(memory: Row, here: Spot, goal: Spot) -> int:
     """Find a way; where the map closes everything, forget who stands, ask for less room, then forget all.
 
     Less room is what the guard lets pass, then what may be as wide as that, since maps err by a cell, then gaps that
-    turned out too narrow before. Return how far that went, 0 to 3.
+    turned out too narrow once before. Return how far that went, 0 to 3.
     """
     stood, kept = memory["stand_n"], memory["kept_n"]
     step = WHOLE
@@ -254,7 +257,8 @@ def forget_and_find(memory: Row, here: Spot, goal: Spot) -> int:
         elif step == LEAST_ROOM:
             ask_for(memory, LEAST)
         elif step == AGAIN:
-            memory["kept_n"] = 0
+            give_up_once(memory)
+            kept = memory["kept_n"]
         elif step == NOTHING:
             kept, memory["room"] = 0, FULL
             forget_all(memory)

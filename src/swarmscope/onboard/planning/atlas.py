@@ -21,8 +21,10 @@ from swarmscope.onboard.deciding.following import away_from_nearest
 from swarmscope.onboard.deciding.progress import last_speed
 from swarmscope.onboard.mapping.cells import FULL, NODE, ask_for, draw_discs
 from swarmscope.onboard.mapping.evidence import learn
-from swarmscope.onboard.mapping.kept import SAME, keep, lose_sight, review
+from swarmscope.onboard.mapping.kept import SAME, find_narrow, lose_sight, review
 from swarmscope.onboard.mapping.memory import MAP, new_memory
+from swarmscope.onboard.mapping.tight import Terms, find_tighter, note_gone
+from swarmscope.onboard.mapping.trail import note_passed
 from swarmscope.onboard.mapping.way import START_WITHIN, find_shorter, forget_and_find, is_on_way, nearest_open, shorten
 from swarmscope.onboard.mapping.words import Spot, number
 from swarmscope.onboard.percept import NEVER_S, PEERS, Row
@@ -55,6 +57,8 @@ GAP_M = 0.25
 CLOSE_M = 0.4
 """What is so near in the way to the next corner makes a robot ask whether it can get there at all."""
 COMPANY_M = 1.5
+AT_GAP = 4.0
+"""Times its radius: who is so near to a gap is waited for; it is not the gap that is too narrow."""
 AT_IT_M = 0.3
 """Who is so near to a narrow place does not wait any more."""
 GAVE_S, GIVE_AGAIN = 1.0, 1.5
@@ -92,6 +96,11 @@ class Params(NamedTuple):
     """Time between two searches for a shorter way, or for one where there was none."""
     gain_m: Metres = 0.3
     """A way that has opened is taken when it is shorter by so much."""
+    tight_m: Metres = 0.3
+    """A way through a gap that the guard lets pass and the margin does not is gone when it is shorter by so much."""
+    wary: Annotated[float, Bounds(0.0, 100.0)] = 4.5
+    """And, by a robot whose ways have turned out longer than they looked, by so many times the way to the gap and a
+    metre."""
     evade_s: Seconds = 3.0
     """Others that move are got past when they would be met within so long; 0: never."""
     apart_m: Metres = 0.04
@@ -144,6 +153,8 @@ def decide(see: View, memory: Row, params: Params) -> None:
         see.out["state"], see.out["reason"], see.out["side"] = FOLLOW, R_HELD_NO_NUMBER, 0
         return
     review(memory, see.percept["now_s"])
+    note_gone(memory, here, goal)
+    note_passed(memory, u, v)
     _note_standing(see, memory, params.still_s, cell)
     learn(see, memory, cell, params.deep_m, params.cautious == 1)
     forgot = _keep_way(see, memory, params, here, goal)
@@ -202,12 +213,21 @@ def _keep_way(see: View, memory: Row, params: Params, here: Spot, goal: Spot) ->
             memory["searched_s"], memory["opened"] = now, 0
             forgot = forget_and_find(memory, here, goal)
             memory["failed"] = forgot > 0
+            if forgot == 0:
+                find_tighter(memory, here, goal, _terms(params))
     elif due and (memory["opened"] or not on_way):
         memory["searched_s"], memory["opened"] = now, 0
         find_shorter(memory, here, goal, params.gain_m / params.cell_m)
+        find_tighter(memory, here, goal, _terms(params))
     if memory["way_n"] == 0:
         memory["way_n"], memory["way_u"][0], memory["way_v"][0] = 1, goal.u, goal.v
     return forgot
+
+
+@jit_inline
+def _terms(params: Params) -> Terms:
+    """Return on what terms narrow gaps are gone through."""
+    return Terms(params.tight_m / params.cell_m, params.wary, 1.0 / params.cell_m)
 
 
 @jit_inline
@@ -265,7 +285,7 @@ def _give_way(
     now = see.percept["now_s"]
     waited = now - memory["gives_s"]
     size = see.rig.body.radius_m / giving_way.OF_M
-    if params.give_s <= 0.0 or not _has_company(see, COMPANY_M * size):
+    if params.give_s <= 0.0 or not _is_somebody_at(see, 0.0, 0.0, COMPANY_M * size):
         return wanted[0], wanted[1], False
     begins = waited > GIVE_AGAIN * params.give_s or now - memory["gave_s"] > GAVE_S
     if begins:
@@ -299,11 +319,12 @@ class Gap(NamedTuple):
 
 
 @jit_inner
-def _has_company(see: View, within: float) -> bool:
-    """Tell whether a neighbour is near: then it is the neighbour that is waited for, and not the gap that is narrow."""
+def _is_somebody_at(see: View, x: float, y: float, within: float) -> bool:
+    """Tell whether a neighbour is ``within`` [m] of a place, compass frame from the robot."""
     shared = see.shared
     for t in range(PEERS):
-        if shared["track_id"][t] >= 0 and shared["track_x"][t] ** 2 + shared["track_y"][t] ** 2 < within * within:
+        dx, dy = shared["track_x"][t] - x, shared["track_y"][t] - y
+        if shared["track_id"][t] >= 0 and dx * dx + dy * dy < within * within:
             return True
     return False
 
@@ -315,18 +336,16 @@ def _watch_gap(see: View, memory: Row, params: Params, gap: Gap) -> None:
     if not (gap.is_blocked and gap.free_m < CLOSE_M):
         memory["beside_s"] = max(0.0, memory["beside_s"] - dt)
         return
-    if _has_company(see, COMPANY_M):
+    toward, far = see.percept["compass"] + gap.bearing, gap.free_m + see.rig.body.radius_m
+    x, y = far * math.cos(toward), far * math.sin(toward)
+    if _is_somebody_at(see, x, y, AT_GAP * see.rig.body.radius_m):
         return
     memory["beside_s"] += dt
     if memory["beside_s"] < params.narrow_s:
         return
     memory["beside_s"] = 0.0
-    toward, far = see.percept["compass"] + gap.bearing, gap.free_m + see.rig.body.radius_m
-    place = Spot(
-        (see.shared["x"] + far * math.cos(toward)) / params.cell_m,
-        (see.shared["y"] + far * math.sin(toward)) / params.cell_m,
-    )
-    keep(memory, place, GAP_M / params.cell_m, see.percept["now_s"] + params.keep_s)
+    place = Spot((see.shared["x"] + x) / params.cell_m, (see.shared["y"] + y) / params.cell_m)
+    find_narrow(memory, place, GAP_M / params.cell_m, see.percept["now_s"], params.keep_s)
 
 
 @jit_inline
