@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import _thread
 import errno
 import os
+import signal
 import sys
 import threading
 import traceback
@@ -55,10 +55,12 @@ class PlainErrors(TyperGroup):
 def ctrl_c_is_never_lost() -> Iterator[None]:
     """Ask again for the end where Python drops a Ctrl-C: while a finaliser or a weak reference's callback runs."""
     before = sys.unraisablehook
+    timers: list[threading.Timer] = []
 
     def again(dropped: Any) -> None:
         if dropped.exc_type is KeyboardInterrupt:  # later, since it would be dropped here, too
-            threading.Timer(AGAIN_S, _thread.interrupt_main).start()
+            timers.append(threading.Timer(AGAIN_S, os.kill, (os.getpid(), signal.SIGINT)))
+            timers[-1].start()
         else:
             before(dropped)
 
@@ -67,6 +69,8 @@ def ctrl_c_is_never_lost() -> Iterator[None]:
         yield
     finally:
         sys.unraisablehook = before
+        for timer in timers:
+            timer.cancel()
 
 
 def _words(error: Exception, words: list[str]) -> tuple[str, int]:

@@ -16,7 +16,7 @@ GONE = 32
 KEPT = 8
 """Places that are kept closed at once."""
 LOST = 12
-"""Places of robots that stood when they were last seen, the newest over the oldest."""
+"""Places of robots that stood when last seen, and of gaps that were too narrow, the newest over the oldest."""
 CORNERS = 64
 """Of a way, the goal included."""
 SCRATCH = 12288 + 128
@@ -59,13 +59,13 @@ MAP = np.dtype(
         ("stand_u", np.float32, PEERS),  # [cells]
         ("stand_v", np.float32, PEERS),
         ("stand_r", np.float32, PEERS),  # how far the robot's middle keeps away [cells]
-        # places kept closed: gaps that turned out too narrow
+        # places kept closed: gaps that turned out too narrow, and where somebody stood
         ("kept_n", np.int64),
         ("kept_u", np.float32, KEPT),  # [cells]
         ("kept_v", np.float32, KEPT),
         ("kept_r", np.float32, KEPT),  # how far the robot's middle keeps away [cells]
         ("kept_s", np.float64, KEPT),  # until when
-        # robots that stood when they went out of sight: where, and how often that has happened there
+        # robots that stood when they went out of sight, and gaps that turned out too narrow: where, and how often there
         ("lost_u", np.float32, LOST),  # [cells]
         ("lost_v", np.float32, LOST),
         ("lost_times", np.uint8, LOST),  # 0 = nobody

@@ -124,7 +124,7 @@ class Params(NamedTuple):
     narrow_s: Seconds = 4.0
     """A gap before which something has been in the way for so long is too narrow."""
     keep_s: Seconds = 60.0
-    """So long it is kept closed."""
+    """So long it is kept closed, each time twice as long."""
     forget_m: Metres = 0.0
     """What is farther away along x or y is forgotten, but for the fine layer; 0: nothing is. For studies."""
     cautious: Flag = 1
