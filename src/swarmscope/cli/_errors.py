@@ -21,6 +21,7 @@ from swarmscope.errors import SwarmscopeError
 FAILED, FAULT, INTERRUPTED = 2, 70, 130
 """What a user can mend, what only we can (EX_SOFTWARE), and Ctrl-C."""
 AGAIN_S = 0.02
+"""After this a Ctrl-C that was dropped is sent again."""
 TRACEBACK = "SWARMSCOPE_TRACEBACK"
 """Environment variable: set, an error that nobody thought of is shown in full."""
 

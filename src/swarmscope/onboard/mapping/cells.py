@@ -131,11 +131,11 @@ def _shift(memory: Row, ex: int, ey: int) -> None:
     x0, y0 = memory["west"] // NODE, memory["south"] // NODE
     for k in range(RIM, NODES - RIM):
         kx, ky = (x0 + out, y0 + k) if ex != 0 else (x0 + k, y0 + out)
-        fits_here = _any_fits(memory, kx, ky)
+        fits_here = _any_fits(memory, kx, ky, _beside(memory))
         slim = not fits_here and is_slim(memory, kx, ky)
         if not fits_here and not slim:
             ask_for(memory, LEAST)
-            slim = _least_fits(memory, kx, ky)
+            slim = _any_fits(memory, kx, ky, 1.0)
             ask_for(memory, FULL)
         block(memory, kx, ky, not fits_here, slim)
     if memory["forget_n"] > 0:
@@ -191,21 +191,12 @@ def _beside(memory: Row) -> float:
 
 
 @jit_inner
-def _any_fits(memory: Row, kx: int, ky: int) -> bool:
-    aside = _beside(memory)
+def _any_fits(memory: Row, kx: int, ky: int, aside: float) -> bool:
+    """Tell whether the disc fits at a node or ``aside`` [cells] of it."""
     for k in range(BESIDE if aside > 0.0 else 1):
         if _disc_fits(memory, NODE * kx + 2 + aside * _BESIDE_X[k], NODE * ky + 2 + aside * _BESIDE_Y[k]):
             return True
     return False
-
-
-@jit_inner
-def _least_fits(memory: Row, kx: int, ky: int) -> bool:
-    """Tell whether a disc with the least room fits at a node or a cell beside it."""
-    found = False
-    for k in range(BESIDE):
-        found = found or _disc_fits(memory, NODE * kx + 2.0 + _BESIDE_X[k], NODE * ky + 2.0 + _BESIDE_Y[k])
-    return found
 
 
 @jit
