@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from helpers import DT, place_sim
+from swarmscope.onboard.percept import EVERYBODY
 from swarmscope.onboard.sharing.message import KIND_DIRECTED_REQUEST, KIND_FEATURES, KIND_LATENT, KIND_REQUEST
 from swarmscope.sim.cells import index_robots
 from swarmscope.sim.faults import strike
@@ -141,12 +142,32 @@ def test_crashed_robots_neither_send_nor_receive():
     assert counters(sim, 1, "sent", "queued") == [0, 0]
 
 
-@pytest.mark.parametrize("to", [-1, 2, 10**9])
+@pytest.mark.parametrize("to", [-2, 2, 10**9])
 def test_addresses_that_nobody_has_are_ignored(to):
     sim = line(2)
     post(sim, 0, (to, REQUEST))
     exchange(sim, 0)
     assert counters(sim, 0, "sent", "bytes") == [0, 0]
+
+
+def test_a_packet_for_everybody_is_sent_once_and_heard_by_all_in_range():
+    sim = line(4, gap=2.0, range_m=4.5)
+    post(sim, 0, (EVERYBODY, REQUEST))
+    exchange(sim, 0)
+    assert [heard(sim, i, 1) for i in range(4)] == [[], [content(0, 0, REQUEST)], [content(0, 0, REQUEST)], []]
+    assert counters(sim, 0, "sent", "bytes", "unreachable") == [1, REQUEST, 0]
+
+
+def test_of_a_packet_for_everybody_each_receiver_loses_its_own():
+    sim = line(12, gap=0.1, loss=0.5)
+    for tick in range(60):
+        post(sim, 0, (EVERYBODY, REQUEST))
+        exchange(sim, tick)
+    got = sim.robots["queued"][1:]
+    assert len(set(got.tolist())) > 1
+    assert counters(sim, 0, "sent") == [60]
+    assert counters(sim, 0, "lost")[0] + counters(sim, 0, "crowded")[0] + int(got.sum()) == 60 * 11
+    assert 0.4 < counters(sim, 0, "lost")[0] / (60 * 11) < 0.6
 
 
 @pytest.mark.parametrize("loss", [0.0, 0.3, 1.0])

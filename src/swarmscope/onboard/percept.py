@@ -21,6 +21,8 @@ MAX_INBOX = 8
 """Packets handed over in one tick; more wait for the next."""
 MAX_OUTBOX = 8
 """Packets a robot may send in one tick."""
+EVERYBODY = -1
+"""The address of a packet that is for all who hear it."""
 
 NEVER_S = -1e9
 """Time of what has not happened [s]."""
@@ -133,6 +135,9 @@ SHARED = np.dtype(
         # this tick's packets with a network's features that answer our last round
         ("latent_n", np.uint8),
         ("latent_at", np.uint8, MAX_INBOX),  # index into ``packet``
+        # this tick's packets about ways (``sharing/way_message.py``)
+        ("told_n", np.uint8),
+        ("told_at", np.uint8, MAX_INBOX),  # index into ``packet``
         # counters
         ("dropped_bad", np.int64),  # torn, corrupt or foreign packets
         ("dropped_stale", np.int64),  # old, replayed or unasked-for packets

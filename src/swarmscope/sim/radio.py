@@ -8,7 +8,7 @@ import numpy as np
 
 from swarmscope._jit import jit, jit_inner
 from swarmscope.held import Held
-from swarmscope.onboard.percept import MAX_OUTBOX
+from swarmscope.onboard.percept import EVERYBODY, MAX_OUTBOX
 from swarmscope.onboard.sharing.message import MAX_PACKET_BYTES, is_request
 from swarmscope.sim.faults import is_off_air
 from swarmscope.sim.state import LINKS, QUEUE, Sim
@@ -34,40 +34,64 @@ def exchange(sim: Sim, tick: int) -> None:
 
 @jit_inner
 def _send(sim: Sim, tick: int, i: int, k: int) -> None:
-    """Send packet k of robot i: count it, then lose it, refuse it or queue it."""
+    """Send packet k of robot i, to one or to all: count it, then let it arrive."""
     sender, decision, radio = sim.robots[i], sim.decisions[i], sim.radio
     j, length = decision["out_to"][k], decision["out_length"][k]
-    if j < 0 or j >= sim.robots.size or length <= 0 or length > MAX_PACKET_BYTES:
+    everybody = j == EVERYBODY
+    if (not everybody and (j < 0 or j >= sim.robots.size)) or length <= 0 or length > MAX_PACKET_BYTES:
         return
-    features = not is_request(decision["out"][k, 0])
-    receiver = sim.robots[j]
     airtime = 8.0 * (length + radio.overhead_bytes) / radio.bitrate_bps
     now = tick * sim.clock.dt
-    begin = max(now, max(sender["radio_free_s"], receiver["radio_free_s"]))
+    begin = max(now, sender["radio_free_s"])
+    if not everybody:
+        begin = max(begin, sim.robots[j]["radio_free_s"])
     if begin - now > radio.max_wait_s:
         sender["crowded"] += 1
         return
     sender["sent"] += 1
     sender["bytes"] += length
     sender["air_bytes"] += length + radio.overhead_bytes
-    if features:
+    if not is_request(decision["out"][k, 0]):
         sender["sent_features"] += 1
         sender["feature_bytes"] += length
     sender["radio_free_s"] = begin + airtime
-    dx, dy = receiver["x"] - sender["x"], receiver["y"] - sender["y"]
-    if math.sqrt(dx * dx + dy * dy) > radio.range_m or receiver["crashed"] or is_off_air(receiver, tick):
-        sender["unreachable"] += 1
+    if not everybody:
+        if _is_reached(sim, tick, i, j):
+            _arrive(sim, tick, (i, k, j), begin + airtime)
+        else:
+            sender["unreachable"] += 1
         return
-    receiver["radio_free_s"] = begin + airtime
+    for r in range(sim.robots.size):
+        if r != i and _is_reached(sim, tick, i, r):
+            _arrive(sim, tick, (i, k, r), begin + airtime)
+
+
+@jit_inner
+def _is_reached(sim: Sim, tick: int, i: int, j: int) -> bool:
+    """Tell whether robot j is within the radio range of robot i, and listens."""
+    sender, receiver = sim.robots[i], sim.robots[j]
+    dx, dy = receiver["x"] - sender["x"], receiver["y"] - sender["y"]
+    far = math.sqrt(dx * dx + dy * dy) > sim.radio.range_m
+    return not (far or receiver["crashed"] or is_off_air(receiver, tick))
+
+
+@jit_inner
+def _arrive(sim: Sim, tick: int, packet: tuple[int, int, int], end_s: float) -> None:
+    """Lose, refuse or queue a packet (of robot i, its number k, for robot j) that is on the air until ``end_s``."""
+    i, k, j = packet
+    sender, decision, radio, receiver = sim.robots[i], sim.decisions[i], sim.radio, sim.robots[j]
+    receiver["radio_free_s"] = max(receiver["radio_free_s"], end_s)
+    length = decision["out_length"][k]
     if radio.loss > 0.0:
-        chance = uniform(mix(key(sim.clock.seed, i, tick, RADIO_LOSS) + key(0, k, 0, RADIO_LOSS)))
+        to_whom = j + 1 if decision["out_to"][k] == EVERYBODY else 0
+        chance = uniform(mix(key(sim.clock.seed, i, tick, RADIO_LOSS) + key(to_whom, k, 0, RADIO_LOSS)))
         if chance < radio.loss:
             sender["lost"] += 1
             return
-    if not _queue(sim, j, i, begin + airtime + radio.latency_s, decision["out"][k], length):
+    if not _queue(sim, j, i, end_s + radio.latency_s, decision["out"][k], length):
         sender["crowded"] += 1
         return
-    if features and sim.links_n[0] < LINKS:
+    if not is_request(decision["out"][k, 0]) and sim.links_n[0] < LINKS:
         at = sim.links_n[0]
         sim.links[at, 0], sim.links[at, 1], sim.links[at, 2], sim.links[at, 3] = tick, i, j, length
         sim.links_n[0] = at + 1

@@ -11,7 +11,8 @@ from swarmscope._jit import jit_alloc
 from swarmscope.held import Held
 from swarmscope.onboard.sharing.codes import put_checksum, put_u16
 from swarmscope.onboard.sharing.message import (
-    KIND_LATENT,
+    KIND_CLOSED,
+    MAX_CORNERS,
     MAX_FEATURES,
     MAX_PACKET_BYTES,
     VERSION,
@@ -23,6 +24,7 @@ from swarmscope.onboard.sharing.message import (
     is_request,
     name_of,
 )
+from swarmscope.onboard.sharing.way_message import CELL_M, Place, encode_check, encode_closed
 from swarmscope.sim.radio import throw_all
 from swarmscope.sim.state import Sim
 
@@ -141,6 +143,8 @@ def _packet(
         return to, length
     at = (heard.total[0] - known + int(rng.integers(0, known))) % REMEMBERED
     sender, asked, length, packet = heard.sender[at], heard.asked[at], heard.length[at], heard.data[at]
+    if asked < 0:  # everybody was
+        asked = int(rng.integers(0, percepts.size))
     if kind == ANSWERS and is_request(int(packet[0])):
         boot, seq = int(packet[3]) | int(packet[4]) << 8, int(packet[5]) | int(packet[6]) << 8
         liar = _head(rng, percepts, sender)
@@ -169,22 +173,48 @@ def _head(rng: np.random.Generator, percepts: np.ndarray, to: int) -> Head:
 @jit_alloc
 def _forged(rng: np.random.Generator, head: Head, out: np.ndarray) -> int:
     """Write any packet with a right checksum; return its length."""
-    kind = int(rng.integers(0, 6))
+    kind = int(rng.integers(0, 7))
+    if kind == 6:
+        corners = rng.uniform(-LONG, LONG, (MAX_CORNERS, 2))
+        return encode_check(head, _place(rng), corners, int(rng.integers(0, MAX_CORNERS + 1)), out)
     if kind == 0:
         return encode_request(head, out)
     if kind == 1:
         return encode_directed_request(head, rng.uniform(-10.0, 10.0), out)
     if kind == 2:  # a right checksum under anything
         out[:] = rng.integers(0, 256, MAX_PACKET_BYTES, np.uint8)
-        out[0] = (VERSION << 4) | int(rng.integers(0, KIND_LATENT + 2))
+        out[0] = (VERSION << 4) | int(rng.integers(0, KIND_CLOSED + 2))
         return put_checksum(out, int(rng.integers(7, MAX_PACKET_BYTES - 1)))
     return _answer(rng, head, out)
 
 
 @jit_alloc
+def _place(rng: np.random.Generator) -> Place:
+    """Return a place near where robots' frames begin, for that is where most say that they are."""
+    return Place(rng.uniform(-LONG, LONG), rng.uniform(-LONG, LONG))
+
+
+@jit_alloc
+def _walls(rng: np.random.Generator, head: Head, out: np.ndarray) -> int:
+    """Write that a way is closed, by walls that wind about; return its length."""
+    place = _place(rng)
+    cells = np.zeros((MAX_PACKET_BYTES, 2), np.int64)
+    x, y = int(place.x / CELL_M), int(place.y / CELL_M)
+    for k in range(cells.shape[0]):
+        if k == 0 or rng.random() < 0.05:
+            dx, dy = int(rng.integers(-90, 91)), int(rng.integers(-90, 91))
+            step_x, step_y = int(rng.integers(-4, 5)), int(rng.integers(-4, 5))
+        dx, dy = dx + step_x, dy + step_y
+        cells[k, 0], cells[k, 1] = x + dx, y + dy
+    return encode_closed(head, place, cells, cells.shape[0], out, MAX_PACKET_BYTES)
+
+
+@jit_alloc
 def _answer(rng: np.random.Generator, head: Head, out: np.ndarray) -> int:
     """Write an answer with lies in it; return its length."""
-    kind, n = int(rng.integers(0, 3)), int(rng.integers(0, MAX_FEATURES + 1))
+    kind, n = int(rng.integers(0, 4)), int(rng.integers(0, MAX_FEATURES + 1))
+    if kind == 3:
+        return _walls(rng, head, out)
     if kind == 0:
         codes = rng.integers(0, 256, 128, np.uint8)
         return encode_latent(head, codes, int(rng.integers(0, 256)), out)

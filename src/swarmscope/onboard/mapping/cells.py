@@ -17,6 +17,7 @@ import math
 import numpy as np
 
 from swarmscope._jit import jit, jit_inline, jit_inner
+from swarmscope.onboard.mapping.heard import is_told_closed
 from swarmscope.onboard.mapping.pages import PAGE_BITS, block, forget_pages, is_blocked, is_slim
 from swarmscope.onboard.mapping.words import ONE, WORD, ZERO, bit, number, window
 from swarmscope.onboard.percept import Row
@@ -305,7 +306,7 @@ def _was_slim(memory: Row, u: float, v: float) -> bool:
 
 @jit_inner
 def _in_the_way(memory: Row, u: float, v: float) -> bool:
-    """Tell whether a robot that stands for long, or a place kept closed, is in the way of a disc at (u, v)."""
+    """Tell whether a robot that stands, a place kept closed, or what others have told is in the way at (u, v)."""
     for k in range(memory["stand_n"]):
         ex, ey = u - memory["stand_u"][k], v - memory["stand_v"][k]
         if ex * ex + ey * ey < memory["stand_r"][k] ** 2:
@@ -314,7 +315,7 @@ def _in_the_way(memory: Row, u: float, v: float) -> bool:
         ex, ey = u - memory["kept_u"][k], v - memory["kept_v"][k]
         if ex * ex + ey * ey < memory["kept_r"][k] ** 2:
             return True
-    return False
+    return is_told_closed(memory, u, v)
 
 
 @jit_inline
@@ -327,6 +328,12 @@ def is_open(memory: Row, u: float, v: float) -> bool:
 def is_seen_open(memory: Row, u: float, v: float) -> bool:
     """Tell whether the robot may be at (u, v) by the cells of the fine layer alone."""
     return is_fine(memory, u, v) and _disc_fits(memory, u, v) and not _in_the_way(memory, u, v)
+
+
+@jit_inline
+def fits_seen(memory: Row, u: float, v: float) -> bool:
+    """Tell whether the disc fits at (u, v) by the cells of the fine layer alone, whoever stands there."""
+    return is_fine(memory, u, v) and _disc_fits(memory, u, v)
 
 
 @jit_inline

@@ -49,7 +49,7 @@ EVERY = 4
 def learn(see: View, memory: Row, cell_m: float, deep_m: float, cautious: bool) -> None:
     """Take this tick's scan into the map. Cells that close the way are noted in ``closed``, others gone in ``opened``.
 
-    ``cautious``: a cell is cleared as `_is_passed` and `_pass` say, else as soon as one beam goes through its middle.
+    ``cautious``: a cell is cleared as `is_passed` and `_pass` say, else as soon as one beam goes through its middle.
     """
     shared, rig = see.shared, see.rig
     u, v = shared["x"] / cell_m, shared["y"] / cell_m
@@ -175,17 +175,17 @@ def _hit(memory: Row, here: Spot, ix: int, iy: int) -> None:
         memory["evidence"][iy & (NEAR - 1), ix & (NEAR - 1)] = (again << 4) | (sure if sure < MOST else MOST)
     if not known:
         set_cell(memory, ix, iy)
-        if _closes(memory, here.u, here.v, ix + 0.5, iy + 0.5):
+        if closes(memory, here, Spot(ix + 0.5, iy + 0.5), memory["disc_r"][memory["way_room"]]):
             memory["closed"] = 1
 
 
-@jit_inner
-def _closes(memory: Row, u: float, v: float, hu: float, hv: float) -> bool:
-    """Tell whether something at (hu, hv) [cells] is in the way."""
-    au, av = u, v
+@jit
+def closes(memory: Row, here: Spot, there: Spot, room: float) -> bool:
+    """Tell whether something at a place is in the way of a robot ``here`` that takes so much ``room`` [cells]."""
+    au, av = here.u, here.v
     for k in range(memory["way_n"]):
         bu, bv = memory["way_u"][k], memory["way_v"][k]
-        if point_segment_distance(hu, hv, au, av, bu, bv) < memory["disc_r"][memory["way_room"]]:
+        if point_segment_distance(there.u, there.v, au, av, bu, bv) < room:
             return True
         au, av = bu, bv
     return False
@@ -228,12 +228,12 @@ def _clear_passed(see: View, memory: Row, cell_m: float, cautious: bool) -> None
                 if _is_crossed(see, du, dv, cell_m):
                     clear_cell(memory, ix, iy)
                     memory["opened"] = 1
-            elif _is_passed(see, du, dv, cell_m):
+            elif is_passed(see, du, dv, cell_m):
                 _pass(memory, ix, iy, see.percept["now_s"])
 
 
 @jit_inline
-def _is_passed(see: View, du: float, dv: float, cell_m: float) -> bool:
+def is_passed(see: View, du: float, dv: float, cell_m: float) -> bool:
     """Tell whether every beam across the cell that lies (du, dv) [cells] from here ends behind it."""
     sensor = see.rig.sensor
     d = cell_m * math.sqrt(du * du + dv * dv)

@@ -116,6 +116,8 @@ def _block(memory: Row, frame: Frame) -> None:
         _close_round(memory, frame, memory["stand_u"][k], memory["stand_v"][k], memory["stand_r"][k])
     for k in range(memory["kept_n"]):
         _close_round(memory, frame, memory["kept_u"][k], memory["kept_v"][k], memory["kept_r"][k])
+    for k in range(memory["heard_n"]):
+        _close_round(memory, frame, memory["heard_u"][k], memory["heard_v"][k], memory["disc_r"][FULL])
 
 
 @jit_inner

@@ -5,9 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from swarmscope.onboard.mapping.cells import DISC_ROWS, DISCS, QUARTERS, ROOMS, WIDE, WIDE_WORDS
+from swarmscope.onboard.mapping.heard import ANSWERS, HEARD, WRONGED
+from swarmscope.onboard.mapping.met import MET
 from swarmscope.onboard.mapping.pages import DIRECTORY, PAGES, SLIM_PAGES
 from swarmscope.onboard.mapping.words import WORD
 from swarmscope.onboard.percept import NEVER_S, PEERS, Row
+from swarmscope.onboard.sharing.message import MAX_CORNERS
 
 NEAR = 64
 """Cells on a side of the square round the robot in which it is known how sure each cell is."""
@@ -19,6 +22,8 @@ LOST = 12
 """Places of robots that stood when last seen, and of gaps that were too narrow, the newest over the oldest."""
 CORNERS = 64
 """Of a way, the goal included."""
+TALK = 112
+"""Places and cells of a packet about a way."""
 SCRATCH = 12288 + 128
 """Words for searches; places up to 64 m x 64 m take the first 3072."""
 
@@ -107,10 +112,53 @@ MAP = np.dtype(
         ("held_s", np.float64),
         ("leave_s", np.float64),  # until when it leaves along the longest corridor
         ("leave", np.float64),  # compass frame [rad]
+        # what others have told: cells, answer after answer, the oldest first
+        ("heard_n", np.int64),
+        ("heard_u", np.float32, HEARD),  # [cells]
+        ("heard_v", np.float32, HEARD),
+        ("answers_n", np.int64),
+        ("answer_n", np.int16, ANSWERS),  # cells of each
+        ("answer_wrong", np.int16, ANSWERS),  # how often one of them was seen to be free
+        ("answer_s", np.float64, ANSWERS),  # when it came
+        ("answer_from", np.int32, ANSWERS),  # whose it is
+        ("answer_box", np.float32, (ANSWERS, 4)),  # from u to u, from v to v
+        ("wrong_id", np.int32, WRONGED),  # who told something wrong, the newest over the oldest
+        ("wrong_s", np.float64, WRONGED),  # and when that was seen
+        ("wrong_at", np.uint8),
+        # where the frames of others lie (``mapping/met.py``)
+        ("met_n", np.uint8, MET),  # how often it has said where it is while it was in sight, 0 = nobody is noted
+        ("met_id", np.int32, MET),
+        ("met_boot", np.int32, MET),
+        ("met_x", np.float32, MET),  # where it was in its own frame [m]
+        ("met_y", np.float32, MET),
+        ("met_u", np.float32, MET),  # and in ours [cells]
+        ("met_v", np.float32, MET),
+        ("met_gone", np.float32, MET),  # how far we had gone then [cells]
+        ("met_told_s", np.float64, MET),  # when it was last answered
+        ("met_asked_s", np.float64, MET),  # when it was last asked in sight
+        # the question that was last asked, and what may still be sent
+        ("asked_n", np.int64),
+        ("asked_u", np.float32, MAX_CORNERS),
+        ("asked_v", np.float32, MAX_CORNERS),
+        ("asked_s", np.float64),
+        ("budget", np.float64),  # [B]
+        ("asked", np.int32),  # questions, answers given, answers taken in, and those that closed the way
+        ("told", np.int32),
+        ("heard", np.int32),
+        ("changed", np.int32),
+        ("talk_at", np.float64, (TALK, 2)),  # scratch of packets
+        ("talk_cell", np.int32, (TALK, 2)),
     ]
 )
 
 
+OF_SHARING = ("heard", "answer", "wrong", "met_", "asked", "budget", "told", "changed", "talk_")
+"""What the fields begin with that are for asking others."""
+NEVER = (
+    *("wrong_s", "asked_s", "met_told_s", "met_asked_s"),
+    *("comes_s", "gives_s", "gave_s", "searched_s", "held_s", "leave_s"),
+)
+"""Times of what has not happened yet."""
 PER_PAGE = ("rows", "page_x", "page_y")
 
 
@@ -118,18 +166,23 @@ def new_memory(robots: int) -> np.ndarray:
     """Return the memory of ``robots`` robots that have seen nothing yet."""
     memory = np.zeros(robots, MAP)
     memory["gone_s"] = NEVER_S
-    for name in ("comes_s", "gives_s", "gave_s", "searched_s", "held_s", "leave_s"):
+    for name in NEVER:
         memory[name] = NEVER_S
     return memory
 
 
 def used_bytes(memory: Row) -> int:
-    """Return how much of its memory a robot has used: pages, scratch and discs as far as they were wanted."""
+    """Return how much of its memory a robot has used: pages, scratch and discs as far as they were wanted.
+
+    What is for asking others counts with those that do.
+    """
     sizes = {name: MAP[name].itemsize for name in MAP.names or ()}
     of_pages = sum(sizes[name] // PAGES for name in PER_PAGE)
     unused_rows = 1.0 - (2 * memory["disc_half"] + 1) / DISC_ROWS
     of_slims, of_scratch = sizes["slim"] // SLIM_PAGES, sizes["scratch"] // SCRATCH
     whole = sum(size for name, size in sizes.items() if name not in (*PER_PAGE, "slim", "scratch"))
     whole -= sizes["disc"] * unused_rows
+    if memory["asked_s"] == NEVER_S:
+        whole -= sum(sizes[name] for name in sizes if name.startswith(OF_SHARING))
     wanted = of_pages * memory["pages_n"] + of_slims * memory["slims_n"] + of_scratch * memory["scratch_n"]
     return int(whole + wanted)

@@ -10,6 +10,7 @@ from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.geometry import point_segment_distance
 from swarmscope.onboard.mapping.cells import FULL, LEAST, LESS, PHASES, ask_for, forget_all, is_open, open_way
 from swarmscope.onboard.mapping.flood import flood
+from swarmscope.onboard.mapping.heard import forget_heard
 from swarmscope.onboard.mapping.kept import give_up_once
 from swarmscope.onboard.mapping.memory import CORNERS
 from swarmscope.onboard.mapping.search import FOUND, TOO_MANY, shortest
@@ -242,7 +243,7 @@ def _join(memory: Row, here: Spot) -> None:
 
 @jit
 def forget_and_find(memory: Row, here: Spot, goal: Spot) -> int:
-    """Find a way; where the map closes everything, forget who stands, ask for less room, then forget all.
+    """Find a way; where the map closes everything, forget what others told, who stands, ask for less room, forget all.
 
     Less room is what the guard lets pass, then what may be as wide as that, since maps err by a cell, then gaps that
     turned out too narrow once before. Return how far that went, 0 to 3.
@@ -260,9 +261,10 @@ def forget_and_find(memory: Row, here: Spot, goal: Spot) -> int:
             give_up_once(memory)
             kept = memory["kept_n"]
         elif step == NOTHING:
-            kept, memory["room"] = 0, FULL
+            kept = memory["kept_n"] = 0
+            memory["room"] = FULL
             forget_all(memory)
-        if find_way(memory, here, goal) or step == NOTHING:
+        if find_way(memory, here, goal) or (forget_heard(memory) and find_way(memory, here, goal)) or step == NOTHING:
             break
         step += 1
         if step == NOBODY and stood == 0:

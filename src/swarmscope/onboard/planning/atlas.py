@@ -18,7 +18,9 @@ from swarmscope.onboard.control.wanting import halt, head_for
 from swarmscope.onboard.deciding import giving_way
 from swarmscope.onboard.deciding.evading import Evading, comes, evade, keep_right
 from swarmscope.onboard.deciding.following import away_from_nearest
+from swarmscope.onboard.deciding.getting_away import nearest_free, watch_hold
 from swarmscope.onboard.deciding.progress import last_speed
+from swarmscope.onboard.mapping.asking import Talk, ask, listen
 from swarmscope.onboard.mapping.cells import FULL, NODE, ask_for, draw_discs
 from swarmscope.onboard.mapping.evidence import learn
 from swarmscope.onboard.mapping.kept import SAME, find_narrow, lose_sight, review
@@ -29,7 +31,6 @@ from swarmscope.onboard.mapping.way import START_WITHIN, find_shorter, forget_an
 from swarmscope.onboard.mapping.words import Spot, number
 from swarmscope.onboard.percept import NEVER_S, PEERS, Row
 from swarmscope.onboard.perception.corridor import corridor_length
-from swarmscope.onboard.perception.safety import safe_directions
 from swarmscope.onboard.reasons import (
     ADVANCE,
     ARRIVED,
@@ -41,8 +42,6 @@ from swarmscope.onboard.reasons import (
     R_HELD_NO_NUMBER,
     R_LOST,
 )
-from swarmscope.onboard.rig import ESCAPE as ESCAPE_RULE
-from swarmscope.onboard.rig import NARROW
 from swarmscope.onboard.sharing.tracks import moves
 from swarmscope.onboard.view import View
 
@@ -127,6 +126,24 @@ class Params(NamedTuple):
     """So long it is kept closed, each time twice as long."""
     forget_m: Metres = 0.0
     """What is farther away along x or y is forgotten, but for the fine layer; 0: nothing is. For studies."""
+    share: Flag = 0
+    """1: others are asked whether the way is closed, and answered; 0: nothing is sent."""
+    ask_s: Seconds = 2.0
+    """Time between two questions, and between two answers to the same robot, at least."""
+    ask_again_s: Seconds = 6.0
+    """Time between two questions where somebody may hear them and nothing is new, at most."""
+    reach_m: Annotated[float, Bounds(0.0, 7.0, "m")] = 6.0
+    """What is farther from the one who answers is not told."""
+    cells: Annotated[int, Bounds(1, 112)] = 40
+    """Cells that an answer has at most."""
+    payload: Annotated[int, Bounds(50, 140, "B")] = 60
+    """Bytes that a packet has at most."""
+    budget_bps: Annotated[float, Bounds(0.0, 1e6, "bit/s")] = 250.0
+    """So much is sent on average at most."""
+    believe_s: Seconds = 180.0
+    """So long others are believed."""
+    trust_m: Metres = 20.0
+    """A robot that has gone so far since it saw another one does not know any more where that one is."""
     cautious: Flag = 1
     """1: a near cell is cleared when all beams across it pass, several times; 0: as soon as one does. For studies."""
 
@@ -139,6 +156,8 @@ def decide(see: View, memory: Row, params: Params) -> None:
     if memory["disc_half"] == 0:
         draw_discs(memory, (see.rig.body.radius_m + params.margin_m) / cell, see.rig.footprint / cell)
         memory["forget_n"] = math.ceil(params.forget_m / (cell * NODE))
+    if params.share == 1:
+        listen(see, memory, _talk(params))
     if memory["arrived"] or percept["goal_distance"] <= params.arrive_m:
         memory["arrived"] = 1
         halt(see)
@@ -158,7 +177,18 @@ def decide(see: View, memory: Row, params: Params) -> None:
     _note_standing(see, memory, params.still_s, cell)
     learn(see, memory, cell, params.deep_m, params.cautious == 1)
     forgot = _keep_way(see, memory, params, here, goal)
+    if params.share == 1:
+        ask(see, memory, _talk(params), here)
     _drive(see, memory, params, here, forgot)
+
+
+@jit_inline
+def _talk(params: Params) -> Talk:
+    """Return how others are asked and answered."""
+    return Talk(
+        params.cell_m, params.ask_s, params.ask_again_s, params.reach_m, params.cells, params.payload,
+        params.budget_bps / 8.0, params.believe_s, params.trust_m,
+    )  # fmt: skip
 
 
 @jit_inner
@@ -241,7 +271,7 @@ def _drive(see: View, memory: Row, params: Params, here: Spot, forgot: int) -> N
     reason, state = R_CORNER, FOLLOW
     if memory["way_n"] == 1:
         reason, state = R_FREE, ADVANCE
-    _watch_hold(see, memory, params, here)
+    watch_hold(see, memory, here, cell, params.held_s)
     if see.percept["now_s"] < memory["leave_s"]:
         bearing = wrap_angle(memory["leave"] - see.percept["compass"])
         reason, state = R_LEAVES, ESCAPE
@@ -250,7 +280,7 @@ def _drive(see: View, memory: Row, params: Params, here: Spot, forgot: int) -> N
         free = corridor_length(see.masked, see.rig, bearing, see.rig.body.radius_m + params.room_m, ahead)
         _watch_gap(see, memory, params, Gap(bearing, free, free < ahead))
         if free < ahead:
-            heading, found = _nearest_free(see, bearing)
+            heading, found = nearest_free(see, bearing)
             reason = R_BESIDE
             if found:
                 bearing = heading
@@ -354,42 +384,3 @@ def _manner(params: Params) -> Evading:
     return Evading(
         params.evade_s, params.apart_m, params.evade, params.slow, params.right, params.lane_s, params.lane_m
     )  # fmt: skip
-
-
-@jit_inner
-def _nearest_free(see: View, bearing: float) -> tuple[float, bool]:
-    """Return the free direction nearest to ``bearing`` by the widest rule that leaves one, and whether there is one."""
-    sensor = see.rig.sensor
-    for rule in range(NARROW, ESCAPE_RULE + 1):
-        safe_directions(see.masked, sensor, see.reach[rule], see.edges, see.narrow)
-        best, heading = math.inf, 0.0
-        for n in range(sensor.beams):
-            if see.narrow[n]:
-                off = abs(wrap_angle(sensor.angle_min + n * sensor.increment - bearing))
-                if off < best:
-                    best, heading = off, sensor.angle_min + n * sensor.increment
-        if best < 1.6:
-            return wrap_angle(heading), True
-    return 0.0, False
-
-
-@jit_inner
-def _watch_hold(see: View, memory: Row, params: Params, here: Spot) -> None:
-    """Notice a robot that does not get away from where it is; let it leave where there is most room."""
-    now = see.percept["now_s"]
-    moved = 0.05 / params.cell_m
-    gone2 = (here.u - memory["held_u"]) ** 2 + (here.v - memory["held_v"]) ** 2
-    if memory["ticks"] == 1 or gone2 > moved * moved:
-        memory["held_u"], memory["held_v"], memory["held_s"] = here.u, here.v, now
-        return
-    if now - memory["held_s"] < params.held_s or now < memory["leave_s"]:
-        return
-    best, heading = 0.0, 0.0
-    for k in range(24):
-        b = k * math.pi / 12.0
-        free = corridor_length(see.masked, see.rig, b, see.rig.footprint, 3.0)
-        if free > best:
-            best, heading = free, b
-    memory["leave"], memory["leave_s"] = see.percept["compass"] + heading, now + 1.0
-    memory["held_s"] = now
-    memory["closed"] = 1

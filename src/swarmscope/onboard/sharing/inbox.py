@@ -13,6 +13,8 @@ import numpy as np
 from swarmscope._jit import jit, jit_inline, jit_inner, jit_paste
 from swarmscope.onboard.percept import MAX_INBOX, MAX_OUTBOX, PEERS, Row
 from swarmscope.onboard.sharing.message import (
+    KIND_CHECK,
+    KIND_CLOSED,
     KIND_DIRECTED_REQUEST,
     KIND_LATENT,
     OK,
@@ -43,7 +45,7 @@ def read_inbox(see: View) -> None:
     percept, shared, header = see.percept, see.shared, see.header
     now = percept["now_s"]
     shared["ask_n"] = 0
-    shared["latent_n"] = 0
+    shared["latent_n"] = shared["told_n"] = 0
     _forget_old_features(shared, now, see.rig.sharing.max_age_s)
     for k in range(min(MAX_INBOX, percept["n_packets"])):
         data = percept["packet"][k]
@@ -54,6 +56,12 @@ def read_inbox(see: View) -> None:
         if header[1] == percept["id"]:
             shared["dropped_stale"] += 1
             continue
+        if header[0] == KIND_CHECK:
+            if take_request(see, header) >= 0:
+                _note_told(shared, k)
+            else:
+                shared["dropped_stale"] += 1
+            continue
         if is_request(header[0]):
             if not _note_request(see, header):
                 shared["dropped_stale"] += 1
@@ -63,6 +71,9 @@ def read_inbox(see: View) -> None:
             continue
         note_answer(see, header)
         shared["answers_n"] += 1
+        if header[0] == KIND_CLOSED:
+            _note_told(shared, k)
+            continue
         if header[0] == KIND_LATENT:
             shared["latent_at"][shared["latent_n"]] = k
             shared["latent_n"] += 1
@@ -70,6 +81,13 @@ def read_inbox(see: View) -> None:
         heard = see.other
         count = read_features(data, length, see.rig.sensor.range_max, heard.angles, heard.distances)
         _remember(shared, header[1], count, heard.angles, heard.distances)
+
+
+@jit_inner
+def _note_told(shared: Row, k: int) -> None:
+    """Note a packet about ways; who asks about its way is answered by planners that keep a map."""
+    shared["told_at"][shared["told_n"]] = k
+    shared["told_n"] += 1
 
 
 @jit_inner
@@ -109,10 +127,16 @@ def _is_wanted(see: View, header: np.ndarray) -> bool:
     if header[3] != name_of(percept["boot"], shared["asked_seq"]):
         return False
     for a in range(min(MAX_OUTBOX, shared["asked_n"])):
-        if shared["asked_id"][a] == header[1] and shared["asked_done"][a] == 0:
+        if shared["asked_id"][a] == header[1]:
+            first = shared["asked_done"][a] == 0
             shared["asked_done"][a] = 1
-            return True
-    return False
+            return bool(first)
+    if header[0] != KIND_CLOSED or shared["asked_n"] >= MAX_OUTBOX:
+        return False
+    a = shared["asked_n"]  # everybody was asked: who answers is noted now
+    shared["asked_id"][a], shared["asked_done"][a] = header[1], 1
+    shared["asked_n"] = a + 1
+    return True
 
 
 @jit_inner

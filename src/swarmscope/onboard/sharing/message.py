@@ -39,6 +39,10 @@ KIND_DIRECTED_REQUEST = 4
 """A request that says in which direction the asker wants to go."""
 KIND_LATENT = 5
 """A network's features of what the sender sees in that direction, a byte each."""
+KIND_CHECK = 6
+"""A request to everybody: the way that the sender goes (``way_message``)."""
+KIND_CLOSED = 7
+"""The answer: cells in which something stands that closes the way."""
 SEALED = 8
 """Kinds from here on are kept for the same packets with a tag instead of the checksum; nobody reads them yet."""
 
@@ -49,6 +53,10 @@ MAX_FEATURES_BYTES = 44
 """The longest packet that robots send in earnest: ``12 + 2 * MAX_FEATURES``."""
 MAX_PACKET_BYTES = 140
 """Room that any packet fits into: an exact one has ``12 + 8 * MAX_FEATURES`` bytes, a latent one always that many."""
+MAX_CORNERS = 12
+"""Of a way in a CHECK."""
+CHECK_HEAD, CLOSED_HEAD = 12, 14
+"""Bytes before the corners of a CHECK, before the cells of a CLOSED."""
 LATENT_FEATURES = 128
 """Features in a LATENT packet, always all of them."""
 
@@ -63,7 +71,8 @@ STATUS_NAMES = ("ok", "too short", "bad version", "bad kind", "bad length", "bad
 HEADER_FIELDS = ("kind", "sender", "seq", "reply_to", "n", "boot")
 """What ``decode`` fills in, in this order; -1 where the packet has no such field.
 
-``n`` is the number of features; of a DIRECTED_REQUEST the code of its direction, of a LATENT that of its scale."""
+``n`` is the number of features; of a DIRECTED_REQUEST the code of its direction, of a LATENT that of its scale, of a
+CHECK the number of its corners, of a CLOSED that of the bytes that hold its cells."""
 
 _PLAIN = 7
 """Bytes that every packet starts with: version and kind, sender, boot, seq."""
@@ -97,7 +106,7 @@ def _usable(n: int, angles: np.ndarray, distances: np.ndarray) -> int:
 
 
 @jit_inline
-def _put_head(out: np.ndarray, kind: int, head: Head) -> None:
+def put_head(out: np.ndarray, kind: int, head: Head) -> None:
     """Write the seven bytes that every packet starts with."""
     out[0] = (VERSION << 4) | kind
     put_u16(out, 1, head.sender)
@@ -106,9 +115,9 @@ def _put_head(out: np.ndarray, kind: int, head: Head) -> None:
 
 
 @jit_inline
-def _put_answer_head(out: np.ndarray, kind: int, head: Head) -> None:
+def put_answer_head(out: np.ndarray, kind: int, head: Head) -> None:
     """Write the nine bytes that every answer starts with."""
-    _put_head(out, kind, head)
+    put_head(out, kind, head)
     put_u16(out, _PLAIN, head.reply_to)
 
 
@@ -117,7 +126,7 @@ def encode_request(head: Head, out: np.ndarray) -> int:
     """Write a REQUEST into ``out`` uint8; return its length (0 when ``out`` is too small)."""
     if out.size < REQUEST_BYTES:
         return 0
-    _put_head(out, KIND_REQUEST, head)
+    put_head(out, KIND_REQUEST, head)
     return put_checksum(out, _PLAIN)
 
 
@@ -129,7 +138,7 @@ def encode_directed_request(head: Head, direction: float, out: np.ndarray) -> in
     """
     if out.size < DIRECTED_REQUEST_BYTES:
         return 0
-    _put_head(out, KIND_DIRECTED_REQUEST, head)
+    put_head(out, KIND_DIRECTED_REQUEST, head)
     out[_PLAIN] = angle_code(direction)
     return put_checksum(out, _PLAIN + 1)
 
@@ -149,7 +158,7 @@ def encode_latent(head: Head, codes: np.ndarray, scale_code: int, out: np.ndarra
     """
     if out.size < MAX_PACKET_BYTES or codes.size < LATENT_FEATURES:
         return 0
-    _put_answer_head(out, KIND_LATENT, head)
+    put_answer_head(out, KIND_LATENT, head)
     out[_HEAD - 1] = scale_code & 0xFF
     for k in range(LATENT_FEATURES):
         out[_HEAD + k] = codes[k]
@@ -183,7 +192,7 @@ def encode_features(
     n = _usable(n, angles, distances)
     if out.size < _HEAD + 2 * n + 2:
         return 0
-    _put_answer_head(out, KIND_FEATURES, head)
+    put_answer_head(out, KIND_FEATURES, head)
     out[_HEAD - 1] = n
     angle_codes, distance_codes = out[_HEAD : _HEAD + n], out[_HEAD + n : _HEAD + 2 * n]
     for k in range(n):
@@ -201,7 +210,7 @@ def encode_exact_features(head: Head, angles: np.ndarray, distances: np.ndarray,
     n = _usable(n, angles, distances)
     if out.size < _HEAD + 8 * n + 2:
         return 0
-    _put_answer_head(out, KIND_EXACT_FEATURES, head)
+    put_answer_head(out, KIND_EXACT_FEATURES, head)
     out[_HEAD - 1] = n
     for k in range(n):
         distance = distances[k] if distances[k] > 0.0 else 0.0
@@ -214,7 +223,7 @@ def encode_exact_features(head: Head, angles: np.ndarray, distances: np.ndarray,
 def is_request(first: int) -> bool:
     """Tell by its first byte whether a packet asks; all others bring features."""
     kind = first & 0xF
-    return kind in (KIND_REQUEST, KIND_DIRECTED_REQUEST)
+    return kind in (KIND_REQUEST, KIND_DIRECTED_REQUEST, KIND_CHECK)
 
 
 @jit_inline
@@ -225,14 +234,46 @@ def is_list(kind: int) -> bool:
 
 @jit_inline
 def _packet_bytes(kind: int, n: int) -> int:
-    """Return how long a packet of ``kind`` with a list of ``n`` features is."""
+    """Return how long a packet of ``kind`` with a list of ``n`` features, corners or bytes is."""
     if kind == KIND_REQUEST:
         return REQUEST_BYTES
     if kind == KIND_DIRECTED_REQUEST:
         return DIRECTED_REQUEST_BYTES
     if kind == KIND_LATENT:
         return MAX_PACKET_BYTES
+    if kind == KIND_CHECK:
+        return CHECK_HEAD + 3 * n + 2
+    if kind == KIND_CLOSED:
+        return CLOSED_HEAD + n + 2
     return _HEAD + 2 + (2 if kind == KIND_FEATURES else 8) * n
+
+
+@jit_inline
+def _least_bytes(kind: int) -> int:
+    """Return how long a packet of ``kind`` is at least."""
+    if kind == KIND_CHECK:
+        return CHECK_HEAD + 2
+    if kind == KIND_CLOSED:
+        return CLOSED_HEAD + 2
+    return REQUEST_BYTES if is_request(kind) else _HEAD + 2
+
+
+@jit_inline
+def _count(data: np.ndarray, kind: int) -> int:
+    """Return how many features, corners or bytes of cells a packet says that it holds."""
+    if kind == KIND_CHECK:
+        return int(data[CHECK_HEAD - 1])
+    if kind == KIND_CLOSED:
+        return int(data[CLOSED_HEAD - 1])
+    return int(data[_HEAD - 1]) if is_list(kind) else 0
+
+
+@jit_inline
+def _most(kind: int) -> int:
+    """Return how many of them a packet may hold."""
+    if kind == KIND_CHECK:
+        return MAX_CORNERS
+    return MAX_PACKET_BYTES if kind == KIND_CLOSED else MAX_FEATURES
 
 
 @jit_inline
@@ -244,12 +285,12 @@ def _check(data: np.ndarray, length: int) -> int:
     if first >> 4 != VERSION:
         return BAD_VERSION
     kind = first & 0xF
-    if kind < KIND_REQUEST or kind > KIND_LATENT:
+    if kind < KIND_REQUEST or kind > KIND_CLOSED:
         return BAD_KIND
-    if not is_request(first) and length < _HEAD + 2:
+    if length < _least_bytes(kind):
         return TOO_SHORT
-    n = int(data[_HEAD - 1]) if is_list(kind) else 0
-    if n > MAX_FEATURES or length != _packet_bytes(kind, n):
+    n = _count(data, kind)
+    if n > _most(kind) or length != _packet_bytes(kind, n):
         return BAD_LENGTH
     return OK if crc16(data, length - 2, CRC_INIT) == get_u16(data, length - 2) else BAD_CHECKSUM
 
@@ -270,9 +311,11 @@ def decode(data: np.ndarray, length: int, header: np.ndarray) -> int:
         header[2] = get_u16(data, 5)
         if header[0] == KIND_DIRECTED_REQUEST:
             header[4] = int(data[_PLAIN])
+        elif header[0] == KIND_CHECK:
+            header[4] = _count(data, KIND_CHECK)
         elif header[0] != KIND_REQUEST:
             header[3] = get_u16(data, _PLAIN)
-            header[4] = int(data[_HEAD - 1])
+            header[4] = int(data[CLOSED_HEAD - 1]) if header[0] == KIND_CLOSED else int(data[_HEAD - 1])
     return status
 
 

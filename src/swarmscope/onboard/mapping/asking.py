@@ -1,0 +1,282 @@
+"""One question, forty bytes: "this is my way, who knows it is closed?"
+
+A robot asks when its way has changed, when it meets somebody new, and every few seconds where somebody may have learnt
+something meanwhile. Whoever hears it, knows where the asker is and has the way closed in its own map answers with what
+closes it. Nobody sends more than its share of the air.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from swarmscope._jit import jit, jit_inline, jit_inner
+from swarmscope.onboard.mapping.answering import closed_place, put_in_a_row, trace
+from swarmscope.onboard.mapping.cells import LEAST
+from swarmscope.onboard.mapping.evidence import closes, is_passed
+from swarmscope.onboard.mapping.heard import distrusts, hear, note_wrong, review_heard
+from swarmscope.onboard.mapping.memory import TALK
+from swarmscope.onboard.mapping.met import NOBODY, is_known, known_at, note_met, slot_of
+from swarmscope.onboard.mapping.words import Spot
+from swarmscope.onboard.percept import EVERYBODY, MAX_OUTBOX, PEERS, Row
+from swarmscope.onboard.sharing.inbox import start_round
+from swarmscope.onboard.sharing.message import KIND_CHECK, MAX_CORNERS, OK, Head, decode, name_of
+from swarmscope.onboard.sharing.way_message import (
+    CELL_M,
+    Place,
+    encode_check,
+    encode_closed,
+    read_check,
+    read_closed,
+    read_place,
+)
+from swarmscope.onboard.view import View
+
+TURNS = 10
+"""Robots that are switched on at once ask one after the other."""
+SAVED_S = 2.0
+"""What has not been sent for so long may be sent at once."""
+EVERY = 8
+"""A told cell is looked at for being free in one tick of so many."""
+SAME = 4.0
+"""A corner so near [cells] to one that was asked about is the same."""
+AHEAD_M = 20.0
+"""So much of the way is asked about."""
+
+
+class Talk(NamedTuple):
+    """How robots tell each other what closes their ways. Distances in m, times in s."""
+
+    cell_m: float
+    ask_s: float
+    """Time between two questions at least."""
+    again_s: float
+    """And at most, where somebody may hear them."""
+    reach_m: float
+    """What is farther from the one who answers is not told."""
+    cells: int
+    """Cells that an answer has at most."""
+    payload: int
+    """Bytes that a packet has at most."""
+    budget: float
+    """Bytes that may be sent in a second on average."""
+    keep_s: float
+    """So long others are believed."""
+    trust_m: float
+    """A robot that has gone so far since it saw another one does not know any more where that one's frame lies."""
+
+
+@jit_inline
+def own_place(see: View) -> Place:
+    """Return where the robot is."""
+    return Place(see.shared["x"], see.shared["y"])
+
+
+@jit
+def listen(see: View, memory: Row, talk: Talk) -> None:
+    """Read this tick's packets about ways: answer who asks, take in what is told. Doubt what is told and seen free."""
+    percept, shared = see.percept, see.shared
+    cap = talk.budget * SAVED_S
+    memory["budget"] = min(cap, memory["budget"] + talk.budget * percept["dt_s"])
+    review_heard(memory, percept["now_s"], talk.keep_s)
+    _doubt(see, memory, talk.cell_m)
+    for i in range(shared["told_n"]):
+        k = shared["told_at"][i]
+        if decode(percept["packet"][k], percept["packet_length"][k], see.header) != OK:
+            continue
+        if see.header[0] == KIND_CHECK:
+            _answer(see, memory, talk, k)
+        else:
+            _take_in(see, memory, talk, k)
+
+
+@jit_inner
+def _doubt(see: View, memory: Row, cell_m: float) -> None:
+    """Note told cells that the robot sees to be free."""
+    u, v = see.shared["x"] / cell_m, see.shared["y"] / cell_m
+    k = memory["ticks"] % EVERY
+    while k < memory["heard_n"]:
+        if is_passed(see, memory["heard_u"][k] - u, memory["heard_v"][k] - v, cell_m):
+            note_wrong(memory, k, see.percept["now_s"])
+        k += EVERY
+
+
+@jit_inner
+def _find(see: View, memory: Row, talk: Talk, place: Place) -> int:
+    """Return where the sender of the packet in ``see.header`` is noted; if it is in sight, note where it is first.
+
+    What it says of itself it said a tick ago.
+    """
+    shared, sender, boot = see.shared, see.header[1], see.header[5]
+    for t in range(PEERS):
+        if shared["track_id"][t] == sender and shared["track_seen_s"][t] == see.percept["now_s"]:
+            u = (shared["x"] + shared["track_was_x"][t]) / talk.cell_m
+            v = (shared["y"] + shared["track_was_y"][t]) / talk.cell_m
+            return note_met(memory, (sender, boot), place, Spot(u, v), talk.cell_m)
+    k = slot_of(memory, sender)
+    return k if is_known(memory, k, boot, talk.trust_m / talk.cell_m) else NOBODY
+
+
+@jit_inner
+def _answer(see: View, memory: Row, talk: Talk, packet: int) -> None:
+    """Tell the sender of a CHECK what closes its way, if that is known and there is room on the air."""
+    shared, out, now = see.shared, see.out, see.percept["now_s"]
+    data, length = see.percept["packet"][packet], see.percept["packet_length"][packet]
+    place = read_place(data, 7)
+    who = _find(see, memory, talk, place)
+    if who < 0 or out["n_out"] >= MAX_OUTBOX or memory["budget"] <= 0.0 or now - memory["met_told_s"][who] < talk.ask_s:
+        return
+    there = known_at(memory, who, place, talk.cell_m)
+    n = read_check(data, length, memory["talk_at"])
+    for k in range(n):
+        memory["talk_at"][k, 0] = there.u + memory["talk_at"][k, 0] / talk.cell_m
+        memory["talk_at"][k, 1] = there.v + memory["talk_at"][k, 1] / talk.cell_m
+    reach = min(talk.reach_m, 7.0) / talk.cell_m
+    closed, u, v = closed_place(see, memory, talk.cell_m, memory["talk_at"], (n, reach))
+    if not closed:
+        return
+    n = trace(see, memory, talk.cell_m, (u, v), (min(TALK, talk.cells), reach))
+    if n == 0:
+        return
+    put_in_a_row(memory, n)
+    _to_lattice(memory, n, talk.cell_m)
+    shared["seq"] = (shared["seq"] + 1) & 0xFFFF
+    head = Head(see.percept["id"], see.percept["boot"], shared["seq"], name_of(see.header[5], see.header[2]))
+    k = out["n_out"]
+    length = encode_closed(head, own_place(see), memory["talk_cell"], n, out["out"][k], talk.payload)
+    if length > 0:
+        out["out_to"][k], out["out_length"][k], out["n_out"] = see.header[1], length, k + 1
+        memory["budget"] -= length
+        memory["met_told_s"][who] = now
+        memory["told"] += 1
+
+
+@jit_inner
+def _to_lattice(memory: Row, n: int, cell_m: float) -> None:
+    """Turn numbers of cells of the map into those of the cells in which packets have them."""
+    for k in range(n):
+        for axis in range(2):
+            memory["talk_cell"][k, axis] = int(math.floor((memory["talk_cell"][k, axis] + 0.5) * cell_m / CELL_M))
+
+
+@jit_inner
+def _take_in(see: View, memory: Row, talk: Talk, packet: int) -> None:
+    """Take in what closes the way by another robot's map."""
+    data, length = see.percept["packet"][packet], see.percept["packet_length"][packet]
+    place = read_place(data, 9)
+    who = _find(see, memory, talk, place)
+    if who < 0 or distrusts(memory, see.header[1], see.percept["now_s"], talk.keep_s):
+        return
+    there = known_at(memory, who, place, talk.cell_m)
+    n = read_closed(data, length, memory["talk_at"])
+    for k in range(n):
+        memory["talk_at"][k, 0] = there.u + memory["talk_at"][k, 0] / talk.cell_m
+        memory["talk_at"][k, 1] = there.v + memory["talk_at"][k, 1] / talk.cell_m
+    if n <= 0 or not hear(memory, memory["talk_at"], n, see.percept["now_s"], see.header[1]):
+        return
+    memory["heard"] += 1
+    here = Spot(see.shared["x"] / talk.cell_m, see.shared["y"] / talk.cell_m)
+    r = memory["disc_r"][LEAST]
+    for k in range(n):
+        if closes(memory, here, Spot(memory["talk_at"][k, 0], memory["talk_at"][k, 1]), r):
+            memory["closed"] = 1
+            memory["changed"] += 1
+            return
+
+
+@jit
+def ask(see: View, memory: Row, talk: Talk, here: Spot) -> None:
+    """Ask everybody who may hear it whether the way is closed, if there is reason to, and room on the air."""
+    shared, out, now = see.shared, see.out, see.percept["now_s"]
+    if memory["asked_s"] < 0.0:
+        memory["asked_s"] = now - talk.ask_s * (1.0 - see.percept["id"] % TURNS / TURNS)  # not all at once
+    since = now - memory["asked_s"]
+    if since < talk.ask_s or memory["way_n"] == 0 or out["n_out"] >= MAX_OUTBOX or memory["budget"] <= 0.0:
+        return
+    anybody, new_face = _who_is_there(see, memory, talk)
+    if not anybody:
+        return
+    first = _first_new(memory)
+    if since < talk.again_s and first < 0 and not new_face:
+        return
+    if first < 0 or new_face or since >= talk.again_s:
+        first = 0
+    n = _write_way(memory, here, first, talk.cell_m)
+    start_round(see)
+    head = Head(see.percept["id"], see.percept["boot"], shared["asked_seq"], 0)
+    place = own_place(see)
+    for k in range(n):
+        memory["talk_at"][k, 0] -= place.x
+        memory["talk_at"][k, 1] -= place.y
+    k = out["n_out"]
+    length = encode_check(head, place, memory["talk_at"], n, out["out"][k])
+    if length > 0:
+        out["out_to"][k], out["out_length"][k], out["n_out"] = EVERYBODY, length, k + 1
+        memory["budget"] -= length
+        memory["asked_s"] = now
+        memory["asked"] += 1
+        _note_asked(see, memory)
+
+
+@jit_inner
+def _who_is_there(see: View, memory: Row, talk: Talk) -> tuple[bool, bool]:
+    """Return whether somebody may hear and understand us, and whether somebody is in sight that was not asked yet."""
+    shared, anybody, new_face = see.shared, False, False
+    for t in range(PEERS):
+        if shared["track_id"][t] >= 0:
+            anybody = True
+            k = slot_of(memory, shared["track_id"][t])
+            new_face = new_face or (k >= 0 and memory["met_asked_s"][k] < 0.0)
+    for k in range(memory["met_id"].size):
+        near = memory["gone"] - memory["met_gone"][k] <= talk.trust_m / talk.cell_m
+        anybody = anybody or (memory["met_n"][k] > 0 and near)
+    return anybody, new_face
+
+
+@jit_inner
+def _first_new(memory: Row) -> int:
+    """Return the first corner of the way that was not asked about, -1: all were."""
+    for k in range(min(memory["way_n"], MAX_CORNERS)):
+        same = False
+        for j in range(memory["asked_n"]):
+            du, dv = memory["asked_u"][j] - memory["way_u"][k], memory["asked_v"][j] - memory["way_v"][k]
+            same = same or du * du + dv * dv < SAME * SAME
+        if not same:
+            return k
+    return -1
+
+
+@jit_inner
+def _note_asked(see: View, memory: Row) -> None:
+    """Note which way has been asked about, and whom in sight."""
+    n = min(memory["way_n"], MAX_CORNERS)
+    memory["asked_n"] = n
+    for k in range(n):
+        memory["asked_u"][k], memory["asked_v"][k] = memory["way_u"][k], memory["way_v"][k]
+    for t in range(PEERS):
+        k = slot_of(memory, see.shared["track_id"][t])
+        if k >= 0:
+            memory["met_asked_s"][k] = see.percept["now_s"]
+
+
+@jit_inner
+def _write_way(memory: Row, here: Spot, first: int, cell_m: float) -> int:
+    """Write the way from before its corner ``first`` into ``memory["talk_at"]`` [m]; return how many places."""
+    at, far, n = here, 0.0, 0
+    most = AHEAD_M / cell_m
+    for k in range(memory["way_n"]):
+        to = Spot(memory["way_u"][k], memory["way_v"][k])
+        length = math.sqrt((to.u - at.u) ** 2 + (to.v - at.v) ** 2)
+        if k >= first:
+            if n == 0:
+                memory["talk_at"][0, 0], memory["talk_at"][0, 1] = cell_m * at.u, cell_m * at.v
+                n = 1
+            part = min(1.0, max(0.0, most - far) / max(length, 1e-9))
+            memory["talk_at"][n, 0] = cell_m * (at.u + part * (to.u - at.u))
+            memory["talk_at"][n, 1] = cell_m * (at.v + part * (to.v - at.v))
+            n += 1
+        far += length
+        at = to
+        if n == MAX_CORNERS or far >= most:
+            break
+    return n

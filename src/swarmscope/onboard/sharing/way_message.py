@@ -1,0 +1,185 @@
+"""The packets of robots that remember: "this is my way, who knows it is closed?" (CHECK), and what closes it (CLOSED).
+
+Byte by byte in docs/message.md. Places are in the sender's own frame, that of its odometry and compass; where that
+frame lies the receiver finds out for itself. The kernels never raise and never allocate.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from swarmscope._jit import jit, jit_inline
+from swarmscope.onboard.sharing.codes import get_u16, put_checksum, put_u16
+from swarmscope.onboard.sharing.message import (
+    CHECK_HEAD,
+    CLOSED_HEAD,
+    KIND_CHECK,
+    KIND_CLOSED,
+    MAX_CORNERS,
+    Head,
+    put_answer_head,
+    put_head,
+)
+
+PLACE_M = 1.0 / 64.0
+"""Step of the sender's place; places wrap round after 1024 m."""
+CORNER_M = 1.0 / 8.0
+CELL_M = 1.0 / 16.0
+"""Side of the cells of a CLOSED."""
+_CORNER_MOST = 2047
+_NEAR = 7
+"""Steps from cell to cell that one byte holds along either axis."""
+_LEAP = 0x88
+"""What no step is coded as: the next two bytes name a cell anew."""
+
+
+class Place(NamedTuple):
+    """Where a robot is in its own frame [m]."""
+
+    x: float
+    y: float
+
+
+@jit_inline
+def _put_place(out: np.ndarray, at: int, place: Place) -> None:
+    """Write a place into four bytes; what is no number is written as 0."""
+    put_u16(out, at, _steps(place.x))
+    put_u16(out, at + 2, _steps(place.y))
+
+
+@jit_inline
+def _steps(x: float) -> int:
+    """Return a place along an axis [m] in steps, modulo 65536."""
+    return math.floor(x / PLACE_M + 0.5) & 0xFFFF if abs(x) < 1e9 else 0
+
+
+@jit_inline
+def read_place(data: np.ndarray, at: int) -> Place:
+    """Return where the sender was, modulo 1024 m."""
+    return Place(get_u16(data, at) * PLACE_M, get_u16(data, at + 2) * PLACE_M)
+
+
+@jit_inline
+def unwrapped(step: float) -> float:
+    """Return the difference [m] of two places that wrap round: the short way."""
+    whole = 65536.0 * PLACE_M
+    return step - whole * math.floor(step / whole + 0.5)
+
+
+@jit
+def encode_check(head: Head, place: Place, corners: np.ndarray, n: int, out: np.ndarray) -> int:
+    """Write a CHECK into ``out`` uint8; return its length (0 when ``out`` is too small).
+
+    ``corners (n, 2)`` [m] of the way, relative to the sender, the first where it begins. Of more than ``MAX_CORNERS``
+    the first are sent; one that is farther than 255 m along an axis is moved there.
+    """
+    n = max(0, min(n, MAX_CORNERS, corners.shape[0]))
+    if out.size < CHECK_HEAD + 3 * n + 2:
+        return 0
+    put_head(out, KIND_CHECK, head)
+    _put_place(out, 7, place)
+    out[CHECK_HEAD - 1] = n
+    for k in range(n):
+        x, y = _corner_code(corners[k, 0]), _corner_code(corners[k, 1])
+        at = CHECK_HEAD + 3 * k
+        out[at], out[at + 1], out[at + 2] = x & 0xFF, (x >> 8) | ((y & 0xF) << 4), y >> 4
+    return put_checksum(out, CHECK_HEAD + 3 * n)
+
+
+@jit_inline
+def _corner_code(x: float) -> int:
+    """Return a place relative to the sender in twelve bits, two's complement; 0 for what is no number."""
+    if not abs(x) < 1e9:
+        return 0
+    return int(max(-_CORNER_MOST, min(_CORNER_MOST, math.floor(x / CORNER_M + 0.5)))) & 0xFFF
+
+
+@jit
+def read_check(data: np.ndarray, length: int, corners: np.ndarray) -> int:
+    """Write the corners of a CHECK that ``decode`` found ``OK`` into ``corners (N, 2)`` [m]; return how many, -1: none.
+
+    They are relative to the sender, along the axes of its frame.
+    """
+    if length < CHECK_HEAD + 2 or length > data.size or int(data[0]) & 0xF != KIND_CHECK:
+        return -1
+    n = min(int(data[CHECK_HEAD - 1]), corners.shape[0], (length - CHECK_HEAD - 2) // 3)
+    for k in range(n):
+        at = CHECK_HEAD + 3 * k
+        a, b, c = int(data[at]), int(data[at + 1]), int(data[at + 2])
+        corners[k, 0] = _signed(a | ((b & 0xF) << 8), 12) * CORNER_M
+        corners[k, 1] = _signed((b >> 4) | (c << 4), 12) * CORNER_M
+    return int(n)
+
+
+@jit_inline
+def _signed(value: int, bits: int) -> int:
+    """Return the number that the lowest ``bits`` stand for in two's complement."""
+    value &= (1 << bits) - 1
+    return value - (1 << bits) if value >> (bits - 1) else value
+
+
+@jit
+def encode_closed(head: Head, place: Place, cells: np.ndarray, n: int, out: np.ndarray, most: int) -> int:
+    """Write a CLOSED of at most ``most`` bytes into ``out`` uint8; return its length, 0: nothing fits.
+
+    ``cells (n, 2)`` are numbers of cells of `CELL_M` of the sender's frame, none farther than 7 m from it along an
+    axis. Those that come first are sent; what is near the cell before takes one byte, else three.
+    """
+    most = min(most, out.size)
+    n = min(n, cells.shape[0])
+    at, x, y = CLOSED_HEAD, 0, 0
+    if n <= 0 or most < CLOSED_HEAD + 4:
+        return 0
+    put_answer_head(out, KIND_CLOSED, head)
+    _put_place(out, 9, place)
+    for k in range(n):
+        dx, dy = cells[k, 0] - x, cells[k, 1] - y
+        near = k > 0 and abs(dx) <= _NEAR and abs(dy) <= _NEAR
+        if at + (1 if near else 2 + min(1, k)) + 2 > most:
+            break
+        if near:
+            out[at] = (dx & 0xF) | ((dy & 0xF) << 4)
+            at += 1
+        else:
+            if k > 0:
+                out[at] = _LEAP
+                at += 1
+            out[at], out[at + 1] = cells[k, 0] & 0xFF, cells[k, 1] & 0xFF
+            at += 2
+        x, y = cells[k, 0], cells[k, 1]
+    out[CLOSED_HEAD - 1] = at - CLOSED_HEAD
+    return put_checksum(out, at)
+
+
+@jit
+def read_closed(data: np.ndarray, length: int, cells: np.ndarray) -> int:
+    """Write the middles of the cells of a CLOSED that ``decode`` found ``OK`` into ``cells (N, 2)`` [m].
+
+    Return how many, -1 for other packets.
+
+    They are relative to the sender, along the axes of its frame; what is torn ends the list.
+    """
+    if length < CLOSED_HEAD + 2 or length > data.size or int(data[0]) & 0xF != KIND_CLOSED:
+        return -1
+    place = read_place(data, 9)
+    ox, oy = math.floor(place.x / CELL_M), math.floor(place.y / CELL_M)
+    at, end, n, x, y = CLOSED_HEAD, length - 2, 0, 0, 0
+    anew = True
+    while at < end and n < cells.shape[0]:
+        if not anew and int(data[at]) != _LEAP:
+            x, y = x + _signed(int(data[at]), 4), y + _signed(int(data[at]) >> 4, 4)
+            at += 1
+        else:
+            at += 0 if anew else 1
+            if at + 2 > end:
+                break
+            x, y = _signed(int(data[at]) - ox, 8), _signed(int(data[at + 1]) - oy, 8)
+            at += 2
+        anew = False
+        cells[n, 0] = (ox + x + 0.5) * CELL_M - place.x
+        cells[n, 1] = (oy + y + 0.5) * CELL_M - place.y
+        n += 1
+    return n
