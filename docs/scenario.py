@@ -110,7 +110,7 @@ FORMULAS = (
         "whether (17) holds",
         "`planner.params.wait_s`, `planner.params.still_s`",
     ),
-    ("radio's limit", "what happens with packets that do not fit", "refuse it or queue it", "`radio.bitrate_bps`"),
+    ("radio's limit", "what happens with packets that do not fit", "Lose, refuse or queue a packet", "`radio.bitrate_bps`"),
 )
 """Formula, what it says, words in the docstrings of its code, keys."""
 
