@@ -88,9 +88,9 @@ def test_check_byte_by_byte():
 
 def test_closed_byte_by_byte():
     packet = closed((1.5, -0.25), [(20, -3), (21, -3), (19, 4), (40, 4)])
-    body = [0x27, 2, 1, 8, 7, 4, 3, 6, 5, 96, 0, 0xF0, 0xFF, 7, 20, 253, 0x01, 0x7E, 0x88, 40, 4]
+    body = [0x27, 2, 1, 8, 7, 4, 3, 6, 5, 96, 0, 0xF0, 0xFF, 9, 0xFC, 0x1F, 0x00, 0x01, 0x7E, 0x88, 0x10, 0x80, 0x00]
     assert packet[:-2].tolist() == body
-    assert packet.size == CLOSED_HEAD + 7 + 2
+    assert packet.size == CLOSED_HEAD + 9 + 2
 
 
 def test_headers():
@@ -100,7 +100,7 @@ def test_headers():
     )
     assert decoded(closed((0, 0), [(1, 2)])) == (
         OK,
-        {"kind": KIND_CLOSED, "sender": 0x0102, "seq": 0x0304, "reply_to": 0x0506, "n": 2, "boot": 0x0708},
+        {"kind": KIND_CLOSED, "sender": 0x0102, "seq": 0x0304, "reply_to": 0x0506, "n": 3, "boot": 0x0708},
     )
     assert is_request(int(check((0, 0), [])[0]))
     assert not is_request(int(closed((0, 0), [(0, 0)])[0]))
@@ -135,7 +135,7 @@ def test_forty_cells_beside_one_another_fit_into_sixty_bytes():
     assert len(cells_of(packet)) == 40
 
 
-@pytest.mark.parametrize("most", range(CLOSED_HEAD + 4, 60))
+@pytest.mark.parametrize("most", range(CLOSED_HEAD + 5, 60))
 def test_an_answer_is_never_longer_than_it_may_be(most):
     packet = closed((0.0, 0.0), [(9 * k % 90, 9 * (k // 10)) for k in range(40)], most)
     assert 0 < packet.size <= most
@@ -145,7 +145,7 @@ def test_an_answer_is_never_longer_than_it_may_be(most):
 
 def test_nothing_is_sent_of_nothing_nor_into_too_little_room():
     assert closed((0, 0), []).size == 0
-    assert closed((0, 0), [(1, 1)], most=CLOSED_HEAD + 3).size == 0
+    assert closed((0, 0), [(1, 1)], most=CLOSED_HEAD + 4).size == 0
     out = np.zeros(CHECK_HEAD + 4, np.uint8)
     assert encode_check(HEAD, Place(0.0, 0.0), np.zeros((1, 2)), 1, out) == 0
 
@@ -179,7 +179,7 @@ def test_any_bytes_with_a_right_checksum_are_read_without_harm(data, kind, right
     assert np.isfinite(corners).all()
     assert np.isfinite(cells).all()
     if status == OK:
-        assert np.abs(cells).max() < 16.0
+        assert np.abs(cells).max() < 200.0
 
 
 def test_torn_and_lengthened_packets_are_dropped():

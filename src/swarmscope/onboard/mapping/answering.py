@@ -2,7 +2,8 @@
 
 The way is closed where the least disc fits neither on it nor a little beside it. From what stands there the answer goes
 on along the wall, both ways, as far as the packet holds: who knows only where a way ends tries the place beside it
-next. Told is what the robot has seen itself, near to itself.
+next. Told is what the robot has seen itself; of what it has left behind, the middles of the nodes
+that are shut.
 """
 
 from __future__ import annotations
@@ -13,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 
 from swarmscope._jit import jit, jit_inline, jit_inner
-from swarmscope.onboard.mapping.cells import LEAST, NODE, ask_for, fits_seen, is_near, row_of
+from swarmscope.onboard.mapping.cells import LEAST, NODE, ask_for, fits, is_fine, row_of
 from swarmscope.onboard.mapping.evidence import is_passed
-from swarmscope.onboard.mapping.pages import is_slim
+from swarmscope.onboard.mapping.pages import is_blocked, is_slim
 from swarmscope.onboard.mapping.words import WORD, ZERO, Spot, bit, lowest, number, without_lowest
 from swarmscope.onboard.percept import Row
 from swarmscope.onboard.view import View
@@ -82,7 +83,7 @@ def _is_walled(see: View, memory: Row, cell: float, at: Leg) -> bool:
     """Tell whether nothing fits at a place of a way, nor beside it."""
     for k in range(5):
         aside = ASIDE * (k - 2)
-        if fits_seen(memory, at.u - aside * at.ev, at.v + aside * at.eu):
+        if fits(memory, at.u - aside * at.ev, at.v + aside * at.eu):
             return False
     return _wall_at(see, memory, cell, (at.u, at.v))[0]
 
@@ -93,7 +94,7 @@ def _wall_at(see: View, memory: Row, cell: float, at: tuple[float, float]) -> tu
     cx, cy = int(math.floor(at[0])), int(math.floor(at[1]))
     best, at_x, at_y = AT_WALL * AT_WALL + 1, 0, 0
     for iy in range(cy - AT_WALL, cy + AT_WALL + 1):
-        row = row_of(memory, cx - AT_WALL, iy) & (bit(2 * AT_WALL + 1) - bit(0))
+        row = _things(memory, cx - AT_WALL, iy, 2 * AT_WALL + 1)
         while row != ZERO:
             ix = cx - AT_WALL + lowest(row)
             row = without_lowest(row)
@@ -104,14 +105,26 @@ def _wall_at(see: View, memory: Row, cell: float, at: tuple[float, float]) -> tu
 
 
 @jit_inner
+def _things(memory: Row, ix: int, iy: int, n: int) -> np.uint64:
+    """Return in which of ``n`` cells of a row something stands: beyond the fine layer, in the middles of shut nodes."""
+    if is_fine(memory, float(ix), float(iy)) and is_fine(memory, float(ix + n), float(iy)):
+        return row_of(memory, ix, iy) & (bit(n) - bit(0))
+    row = ZERO
+    if iy % NODE == NODE // 2:
+        first = (NODE // 2 - ix) % NODE
+        for k in range(first, n, NODE):
+            if is_blocked(memory, (ix + k) // NODE, iy // NODE):
+                row |= bit(k)
+    return row
+
+
+@jit_inner
 def _is_sure(see: View, memory: Row, cell: float, ix: int, iy: int) -> bool:
     """Tell whether what stands in a cell closes it to the least disc, too, for all that is known, and is not gone.
 
     What came back from the place layer is one cell a node; where the least disc did fit at the node, it says nothing.
     What moved on is in the map until the robot comes near, but seen to be gone from afar.
     """
-    if not is_near(memory, ix, iy):
-        return False
     at_node = ix % NODE == NODE // 2 and iy % NODE == NODE // 2
     if at_node and is_slim(memory, ix // NODE, iy // NODE):
         return False
@@ -145,7 +158,7 @@ def trace(see: View, memory: Row, cell: float, place: tuple[float, float], terms
             memory["talk_cell"][n, 0], memory["talk_cell"][n, 1] = ix, iy
             n += 1
         for y in range(iy - JOINED, iy + JOINED + 1):
-            row = row_of(memory, ix - JOINED, y) & (bit(2 * JOINED + 1) - bit(0))
+            row = _things(memory, ix - JOINED, y, 2 * JOINED + 1)
             while row != ZERO:
                 x = ix - JOINED + lowest(row)
                 row = without_lowest(row)

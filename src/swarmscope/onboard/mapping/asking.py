@@ -131,7 +131,7 @@ def _answer(see: View, memory: Row, talk: Talk, packet: int) -> None:
     for k in range(n):
         memory["talk_at"][k, 0] = there.u + memory["talk_at"][k, 0] / talk.cell_m
         memory["talk_at"][k, 1] = there.v + memory["talk_at"][k, 1] / talk.cell_m
-    reach = min(talk.reach_m, 7.0) / talk.cell_m
+    reach = talk.reach_m / talk.cell_m
     closed, u, v = closed_place(see, memory, talk.cell_m, memory["talk_at"], (n, reach))
     if not closed:
         return

@@ -33,7 +33,7 @@ _CORNER_MOST = 2047
 _NEAR = 7
 """Steps from cell to cell that one byte holds along either axis."""
 _LEAP = 0x88
-"""What no step is coded as: the next two bytes name a cell anew."""
+"""What no step is coded as: the next three bytes name a cell anew."""
 
 
 class Place(NamedTuple):
@@ -54,6 +54,12 @@ def _put_place(out: np.ndarray, at: int, place: Place) -> None:
 def _steps(x: float) -> int:
     """Return a place along an axis [m] in steps, modulo 65536."""
     return math.floor(x / PLACE_M + 0.5) & 0xFFFF if abs(x) < 1e9 else 0
+
+
+@jit_inline
+def _cell_at(x: float) -> int:
+    """Return the cell in which a place along an axis [m] lies once it has been written."""
+    return math.floor(math.floor(x / PLACE_M + 0.5) * PLACE_M / CELL_M) if abs(x) < 1e9 else 0
 
 
 @jit_inline
@@ -83,10 +89,21 @@ def encode_check(head: Head, place: Place, corners: np.ndarray, n: int, out: np.
     _put_place(out, 7, place)
     out[CHECK_HEAD - 1] = n
     for k in range(n):
-        x, y = _corner_code(corners[k, 0]), _corner_code(corners[k, 1])
-        at = CHECK_HEAD + 3 * k
-        out[at], out[at + 1], out[at + 2] = x & 0xFF, (x >> 8) | ((y & 0xF) << 4), y >> 4
+        _put_pair(out, CHECK_HEAD + 3 * k, _corner_code(corners[k, 0]), _corner_code(corners[k, 1]))
     return put_checksum(out, CHECK_HEAD + 3 * n)
+
+
+@jit_inline
+def _put_pair(out: np.ndarray, at: int, x: int, y: int) -> None:
+    """Write two numbers of twelve bits into three bytes."""
+    out[at], out[at + 1], out[at + 2] = x & 0xFF, (x >> 8) | ((y & 0xF) << 4), y >> 4
+
+
+@jit_inline
+def _pair(data: np.ndarray, at: int) -> tuple[int, int]:
+    """Read them, as two's complements."""
+    a, b, c = int(data[at]), int(data[at + 1]), int(data[at + 2])
+    return _signed(a | ((b & 0xF) << 8), 12), _signed((b >> 4) | (c << 4), 12)
 
 
 @jit_inline
@@ -107,10 +124,8 @@ def read_check(data: np.ndarray, length: int, corners: np.ndarray) -> int:
         return -1
     n = min(int(data[CHECK_HEAD - 1]), corners.shape[0], (length - CHECK_HEAD - 2) // 3)
     for k in range(n):
-        at = CHECK_HEAD + 3 * k
-        a, b, c = int(data[at]), int(data[at + 1]), int(data[at + 2])
-        corners[k, 0] = _signed(a | ((b & 0xF) << 8), 12) * CORNER_M
-        corners[k, 1] = _signed((b >> 4) | (c << 4), 12) * CORNER_M
+        x, y = _pair(data, CHECK_HEAD + 3 * k)
+        corners[k, 0], corners[k, 1] = x * CORNER_M, y * CORNER_M
     return int(n)
 
 
@@ -125,20 +140,21 @@ def _signed(value: int, bits: int) -> int:
 def encode_closed(head: Head, place: Place, cells: np.ndarray, n: int, out: np.ndarray, most: int) -> int:
     """Write a CLOSED of at most ``most`` bytes into ``out`` uint8; return its length, 0: nothing fits.
 
-    ``cells (n, 2)`` are numbers of cells of `CELL_M` of the sender's frame, none farther than 7 m from it along an
-    axis. Those that come first are sent; what is near the cell before takes one byte, else three.
+    ``cells (n, 2)`` are numbers of cells of `CELL_M` of the sender's frame, none farther than 127 m from it along an
+    axis. Those that come first are sent; what is near the cell before takes one byte, else four.
     """
     most = min(most, out.size)
     n = min(n, cells.shape[0])
     at, x, y = CLOSED_HEAD, 0, 0
-    if n <= 0 or most < CLOSED_HEAD + 4:
+    ox, oy = _cell_at(place.x), _cell_at(place.y)
+    if n <= 0 or most < CLOSED_HEAD + 5:
         return 0
     put_answer_head(out, KIND_CLOSED, head)
     _put_place(out, 9, place)
     for k in range(n):
         dx, dy = cells[k, 0] - x, cells[k, 1] - y
         near = k > 0 and abs(dx) <= _NEAR and abs(dy) <= _NEAR
-        if at + (1 if near else 2 + min(1, k)) + 2 > most:
+        if at + (1 if near else 3 + min(1, k)) + 2 > most:
             break
         if near:
             out[at] = (dx & 0xF) | ((dy & 0xF) << 4)
@@ -147,8 +163,8 @@ def encode_closed(head: Head, place: Place, cells: np.ndarray, n: int, out: np.n
             if k > 0:
                 out[at] = _LEAP
                 at += 1
-            out[at], out[at + 1] = cells[k, 0] & 0xFF, cells[k, 1] & 0xFF
-            at += 2
+            _put_pair(out, at, (cells[k, 0] - ox) & 0xFFF, (cells[k, 1] - oy) & 0xFFF)
+            at += 3
         x, y = cells[k, 0], cells[k, 1]
     out[CLOSED_HEAD - 1] = at - CLOSED_HEAD
     return put_checksum(out, at)
@@ -174,10 +190,10 @@ def read_closed(data: np.ndarray, length: int, cells: np.ndarray) -> int:
             at += 1
         else:
             at += 0 if anew else 1
-            if at + 2 > end:
+            if at + 3 > end:
                 break
-            x, y = _signed(int(data[at]) - ox, 8), _signed(int(data[at + 1]) - oy, 8)
-            at += 2
+            x, y = _pair(data, at)
+            at += 3
         anew = False
         cells[n, 0] = (ox + x + 0.5) * CELL_M - place.x
         cells[n, 1] = (oy + y + 0.5) * CELL_M - place.y
