@@ -138,6 +138,7 @@ SHARED = np.dtype(
         # this tick's packets about ways (``sharing/way_message.py``)
         ("told_n", np.uint8),
         ("told_at", np.uint8, MAX_INBOX),  # index into ``packet``
+        ("late_s", np.float64),  # when last an answer came that was not waited for any more
         # counters
         ("dropped_bad", np.int64),  # torn, corrupt or foreign packets
         ("dropped_stale", np.int64),  # old, replayed or unasked-for packets
@@ -173,6 +174,6 @@ def new_shared(robots: int) -> np.ndarray:
     shared = np.zeros(robots, SHARED)
     for name in ("track_id", "heard_id", "sender_id", "window_boot", "trial_boot", "asked_seq", "asked_id"):
         shared[name] = -1
-    for name in ("asked_s", "window_s", "quota_s", "looked_s", "wary_s"):
+    for name in ("asked_s", "late_s", "window_s", "quota_s", "looked_s", "wary_s"):
         shared[name] = NEVER_S
     return shared

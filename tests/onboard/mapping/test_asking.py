@@ -79,11 +79,10 @@ def test_who_knows_a_wall_tells_and_the_way_leads_round_it():
     assert pair.way_m > 13.5
 
 
-def test_questions_go_to_everybody_and_answers_to_who_asked():
+def test_questions_and_answers_go_to_everybody():
     pair = Pair(WALL).go(25)
     to = {(mine, data[0] & 15): address for mine, address, data in pair.sent}
-    assert to[True, KIND_CHECK] == EVERYBODY
-    assert to[False, KIND_CLOSED] == ASKER
+    assert to[True, KIND_CHECK] == to[False, KIND_CLOSED] == EVERYBODY
 
 
 def test_who_has_nothing_to_say_is_silent():
@@ -139,11 +138,34 @@ def test_packets_fit_into_the_payload():
         assert max(lengths) <= payload
 
 
-def told_by(pair, cells):
-    """A forged answer to the asker's present question, in the name of the robot that it sees."""
+def test_an_answer_to_somebody_else_is_heard_once():
+    pair = Pair().go(15)
+    packet = told_by(pair, [(-32, k) for k in range(-40, 41, 3)], to=4242)
+    pair.asker.receive([packet, packet])
+    tick(pair.asker)
+    assert pair.asker.memory["heard"] == 1
+    assert pair.asker.shared["dropped_stale"] == 1
+
+
+def test_while_answers_come_late_those_to_others_are_left_too():
+    pair = Pair(WALL).go(60, delay=10)
+    pair.asker.receive([told_by(pair, [(-32, k) for k in range(-40, 41, 3)], to=4242)])
+    tick(pair.asker)
+    assert pair.asker.memory["heard"] == 0
+    pair.asker.receive([])
+    for _ in range(60):
+        tick(pair.asker)
+    pair.asker.receive([told_by(pair, [(-32, k) for k in range(-40, 41, 3)], to=4242, seq=2)])
+    tick(pair.asker)
+    assert pair.asker.memory["heard"] == 1
+
+
+def told_by(pair, cells, to=None, seq=1):
+    """A forged answer to the asker's present question, or another, in the name of the robot that it sees."""
     shared, percept = pair.asker.shared, pair.asker.percept
     out = np.zeros(MAX_PACKET_BYTES, np.uint8)
-    head = Head(KNOWS, 0, int(shared["seq"]) + 77, name_of(int(percept["boot"]), int(shared["asked_seq"])))
+    to = name_of(int(percept["boot"]), int(shared["asked_seq"])) if to is None else to
+    head = Head(KNOWS, 0, int(pair.knows.shared["seq"]) + seq, to)
     cells = np.array(cells, np.int32)
     return out[: encode_closed(head, Place(0.0, 0.0), cells, len(cells), out, MAX_PACKET_BYTES)].tobytes()
 

@@ -145,7 +145,7 @@ def _answer(see: View, memory: Row, talk: Talk, packet: int) -> None:
     k = out["n_out"]
     length = encode_closed(head, own_place(see), memory["talk_cell"], n, out["out"][k], talk.payload)
     if length > 0:
-        out["out_to"][k], out["out_length"][k], out["n_out"] = see.header[1], length, k + 1
+        out["out_to"][k], out["out_length"][k], out["n_out"] = EVERYBODY, length, k + 1
         memory["budget"] -= length
         memory["met_told_s"][who] = now
         memory["told"] += 1

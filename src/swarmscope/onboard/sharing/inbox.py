@@ -30,8 +30,11 @@ from swarmscope.onboard.sharing.message import (
     read_features,
 )
 from swarmscope.onboard.sharing.peers import may_answer, note_answer, take_request
+from swarmscope.onboard.sharing.window import ahead_by
 from swarmscope.onboard.view import View
 
+OWN_LAST, LATE_S = 8, 10.0
+"""An answer to one of our questions of so many packets ago is late; then none to others are heard for so long."""
 OWN_ROOM = 4
 """So many requests of our own have room in the outbox of a tick, whatever else is in it."""
 
@@ -56,9 +59,10 @@ def read_inbox(see: View) -> None:
         if header[1] == percept["id"]:
             shared["dropped_stale"] += 1
             continue
-        if header[0] == KIND_CHECK:
-            if take_request(see, header) >= 0:
-                _note_told(shared, k)
+        if header[0] in (KIND_CHECK, KIND_CLOSED):
+            if _is_told(see, header):
+                shared["told_at"][shared["told_n"]] = k
+                shared["told_n"] += 1
             else:
                 shared["dropped_stale"] += 1
             continue
@@ -71,9 +75,6 @@ def read_inbox(see: View) -> None:
             continue
         note_answer(see, header)
         shared["answers_n"] += 1
-        if header[0] == KIND_CLOSED:
-            _note_told(shared, k)
-            continue
         if header[0] == KIND_LATENT:
             shared["latent_at"][shared["latent_n"]] = k
             shared["latent_n"] += 1
@@ -84,10 +85,31 @@ def read_inbox(see: View) -> None:
 
 
 @jit_inner
-def _note_told(shared: Row, k: int) -> None:
-    """Note a packet about ways; who asks about its way is answered by planners that keep a map."""
-    shared["told_at"][shared["told_n"]] = k
-    shared["told_n"] += 1
+def _is_told(see: View, header: np.ndarray) -> bool:
+    """Tell whether a packet about ways is left to planners that keep a map: a new question, or an answer to anybody."""
+    if header[0] == KIND_CHECK:
+        return take_request(see, header) >= 0
+    if not _is_wanted(see, header):
+        return _is_overheard(see, header)
+    note_answer(see, header)
+    see.shared["answers_n"] += 1
+    return True
+
+
+@jit_inner
+def _is_overheard(see: View, header: np.ndarray) -> bool:
+    """Tell whether this is a new answer to somebody else, and answers are in time.
+
+    They are not while those to our own last questions come when we do not wait for them any more: who says where it is
+    says where it was long ago.
+    """
+    percept, shared = see.percept, see.shared
+    since = ahead_by(shared["asked_seq"], name_of(percept["boot"], header[3]))
+    if shared["asked_seq"] >= 0 and 0 <= since < OWN_LAST:
+        if since > 0 or percept["now_s"] - shared["asked_s"] > see.rig.sharing.max_age_s:
+            shared["late_s"] = percept["now_s"]
+        return False
+    return percept["now_s"] - shared["late_s"] > LATE_S and take_request(see, header) >= 0
 
 
 @jit_inner
