@@ -11,6 +11,7 @@ import numpy as np
 
 from swarmscope.onboard.body import Body
 from swarmscope.onboard.lidar import Lidar
+from swarmscope.onboard.percept import EVERYBODY
 from swarmscope.onboard.robot import Command, Robot, Seen
 from swarmscope.sim.beams import make_beams
 from swarmscope.sim.lidar import cast_disc, cast_static
@@ -85,7 +86,9 @@ def main() -> None:
             )
             for to, packet in command.outbox:
                 print(f"{tick * DT:5.1f} s  {address} -> {to}: {len(packet)} bytes")
-                air[to].append(packet)
+                for peer in bases if to == EVERYBODY else [to]:
+                    if peer != address:
+                        air[peer].append(packet)
             if command.reason != said[address]:
                 print(f"{tick * DT:5.1f} s  {address} at ({base.x:.2f}, {base.y:.2f}): {command.reason}")
                 said[address] = command.reason

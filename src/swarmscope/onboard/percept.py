@@ -124,6 +124,7 @@ SHARED = np.dtype(
         ("seq", np.int64),
         ("asked_seq", np.int64),  # sequence number of our last request round, -1 = none
         ("asked_s", np.float64),
+        ("asked_all", np.uint8),  # 1: everybody was
         ("asked_n", np.int64),  # how many were asked in that round
         ("asked_id", np.int64, MAX_OUTBOX),  # who, the first ``asked_n`` of these
         ("asked_done", np.uint8, MAX_OUTBOX),  # 1: has answered

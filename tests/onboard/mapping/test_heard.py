@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from drawn_maps import map_of
 
-from swarmscope.onboard.mapping.cells import FULL, LEAST, LESS, ask_for, is_open
+from swarmscope.onboard.mapping.cells import FULL, LEAST, LESS, PHASES, ask_for, is_open
+from swarmscope.onboard.mapping.flood import flood
 from swarmscope.onboard.mapping.heard import ANSWERS, HEARD, distrusts, forget_heard, hear, note_wrong, review_heard
 from swarmscope.onboard.mapping.way import find_way, forget_and_find
 from swarmscope.onboard.mapping.words import Spot
@@ -63,7 +64,7 @@ def test_enough_cells_that_are_seen_free_make_the_whole_answer_wrong():
     memory = map_of()
     told(memory, WALL)
     told(memory, [(100.5, 0.5)])
-    for k in range(2):
+    for k in (0, 1, 1, 0, 1):  # the same cells again do not count
         note_wrong(memory, k, 1.0)
         assert memory["answers_n"] == 2
     assert not distrusts(memory, 3, 1.0, 60.0)
@@ -107,6 +108,27 @@ def test_the_oldest_give_way_to_new_ones():
     assert told(memory, far)
     assert memory["answers_n"] == 1
     assert not told(memory, [(2e4 + 5.0 * k, 0.5) for k in range(HEARD + 1)])
+
+
+@pytest.mark.parametrize("half", [4.0, 6.0])
+@pytest.mark.parametrize("x", [18.5, 19.5, 20.5, 21.5])
+@pytest.mark.parametrize("y", [1.5, 3.5])
+def test_a_flood_goes_through_gaps_between_told_walls_and_not_through_the_walls(half, x, y):
+    side = [3.0 * k for k in range(20)]
+    walls = [(x, y + half + d) for d in side], [(x, y - half - d) for d in side]
+    memory = map_of()
+    for wall in walls:
+        told(memory, wall)
+    reached = False
+    for phase in range(PHASES):
+        memory["phase"] = phase
+        if flood(memory, 0.5, 0.5, 40.5, 0.5):
+            reached = reached or length(memory) < 60.0
+    assert reached
+    told(memory, [(x, y + k) for k in (-3.0, 0.0, 3.0)])
+    for phase in range(PHASES):
+        memory["phase"] = phase
+        assert not flood(memory, 0.5, 0.5, 40.5, 0.5) or length(memory) > 80.0
 
 
 def test_forgetting_says_whether_there_was_anything():

@@ -38,8 +38,20 @@ def test_the_shift_is_the_mean_of_what_is_measured():
         x = rng.uniform(0.0, 10.0)
         k = met(memory, 7, (x, 0.0), (x / CELL + rng.normal(0.0, 2.0), 0.0))
     assert abs(known_at(memory, k, Place(5.0, 0.0), CELL).u - 80.0) < 2.0
-    met(memory, 7, (5.0, 0.0), (180.0, 0.0))  # one that is far off moves it by an eighth
-    assert known_at(memory, k, Place(5.0, 0.0), CELL).u == pytest.approx(80.0 + 100.0 / 8.0, abs=3.0)
+    met(memory, 7, (5.0, 0.0), (96.0, 0.0))  # one that is a metre off moves it by an eighth
+    assert known_at(memory, k, Place(5.0, 0.0), CELL).u == pytest.approx(80.0 + 16.0 / 8.0, abs=2.0)
+
+
+def test_who_says_that_it_is_elsewhere_is_not_believed_and_forgotten_when_that_goes_on():
+    memory = new_memory(1)[0]
+    for _ in range(8):
+        k = met(memory, 7, (5.0, 0.0), (80.0, 0.0))
+    assert met(memory, 7, (500.0, 0.0), (80.0, 0.0)) == NOBODY
+    assert known_at(memory, k, Place(5.0, 0.0), CELL).u == 80.0
+    for _ in range(3):
+        assert met(memory, 7, (500.0, 0.0), (80.0, 0.0)) == NOBODY
+    assert met(memory, 7, (500.0, 0.0), (80.0, 0.0)) == k
+    assert known_at(memory, k, Place(500.0, 0.0), CELL).u == 80.0
 
 
 def test_who_has_restarted_has_a_new_frame():

@@ -216,5 +216,5 @@ def test_a_place_of_64_m_takes_less_than_64_kB():
             block(memory, kx, ky, True, False)
     assert flood(memory, 0.0, 0.0, 500.0, 500.0)
     assert used_bytes(memory) <= 64_000
-    memory["asked_s"] = 0.0  # with what is for asking others
+    memory["budget"] = 1.0  # with what is for asking others
     assert 64_000 < used_bytes(memory) <= 72_000

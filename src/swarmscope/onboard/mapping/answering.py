@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from swarmscope._jit import jit, jit_inline, jit_inner
-from swarmscope.onboard.mapping.cells import LEAST, NODE, ask_for, fits, is_fine, row_of
+from swarmscope.onboard.mapping.cells import LEAST, NODE, ask_for, fits, is_fine, is_set, row_of
 from swarmscope.onboard.mapping.evidence import is_passed
 from swarmscope.onboard.mapping.pages import is_blocked, is_slim
 from swarmscope.onboard.mapping.words import WORD, ZERO, Spot, bit, lowest, number, without_lowest
@@ -113,7 +113,9 @@ def _things(memory: Row, ix: int, iy: int, n: int) -> np.uint64:
     if iy % NODE == NODE // 2:
         first = (NODE // 2 - ix) % NODE
         for k in range(first, n, NODE):
-            if is_blocked(memory, (ix + k) // NODE, iy // NODE):
+            if is_fine(memory, float(ix + k), float(iy)):
+                row |= bit(k) if is_set(memory, ix + k, iy) else ZERO
+            elif is_blocked(memory, (ix + k) // NODE, iy // NODE):
                 row |= bit(k)
     return row
 

@@ -18,7 +18,7 @@ from swarmscope.onboard.mapping.heard import distrusts, hear, note_wrong, review
 from swarmscope.onboard.mapping.memory import TALK
 from swarmscope.onboard.mapping.met import NOBODY, is_known, known_at, note_met, slot_of
 from swarmscope.onboard.mapping.words import Spot
-from swarmscope.onboard.percept import EVERYBODY, MAX_OUTBOX, PEERS, Row
+from swarmscope.onboard.percept import EVERYBODY, MAX_OUTBOX, NEVER_S, PEERS, Row
 from swarmscope.onboard.sharing.inbox import start_round
 from swarmscope.onboard.sharing.message import KIND_CHECK, MAX_CORNERS, OK, Head, decode, name_of
 from swarmscope.onboard.sharing.way_message import (
@@ -188,7 +188,7 @@ def _take_in(see: View, memory: Row, talk: Talk, packet: int) -> None:
 def ask(see: View, memory: Row, talk: Talk, here: Spot) -> None:
     """Ask everybody who may hear it whether the way is closed, if there is reason to, and room on the air."""
     shared, out, now = see.shared, see.out, see.percept["now_s"]
-    if memory["asked_s"] < 0.0:
+    if memory["asked_s"] == NEVER_S:
         memory["asked_s"] = now - talk.ask_s * (1.0 - see.percept["id"] % TURNS / TURNS)  # not all at once
     since = now - memory["asked_s"]
     if since < talk.ask_s or memory["way_n"] == 0 or out["n_out"] >= MAX_OUTBOX or memory["budget"] <= 0.0:
@@ -196,13 +196,16 @@ def ask(see: View, memory: Row, talk: Talk, here: Spot) -> None:
     anybody, new_face = _who_is_there(see, memory, talk)
     if not anybody:
         return
-    first = _first_new(memory)
+    first = _first_new(memory, here, talk.cell_m)
     if since < talk.again_s and first < 0 and not new_face:
         return
     if first < 0 or new_face or since >= talk.again_s:
         first = 0
     n = _write_way(memory, here, first, talk.cell_m)
+    if n < 2:
+        return
     start_round(see)
+    shared["asked_all"] = 1
     head = Head(see.percept["id"], see.percept["boot"], shared["asked_seq"], 0)
     place = own_place(see)
     for k in range(n):
@@ -215,7 +218,7 @@ def ask(see: View, memory: Row, talk: Talk, here: Spot) -> None:
         memory["budget"] -= length
         memory["asked_s"] = now
         memory["asked"] += 1
-        _note_asked(see, memory)
+        _note_asked(see, memory, here, talk.cell_m)
 
 
 @jit_inner
@@ -234,10 +237,15 @@ def _who_is_there(see: View, memory: Row, talk: Talk) -> tuple[bool, bool]:
 
 
 @jit_inner
-def _first_new(memory: Row) -> int:
-    """Return the first corner of the way that was not asked about, -1: all were."""
+def _first_new(memory: Row, here: Spot, cell_m: float) -> int:
+    """Return the first corner of the way that was not asked about, as far as it is asked about; -1: all were."""
+    at, far = here, 0.0
     for k in range(min(memory["way_n"], MAX_CORNERS)):
-        same = False
+        if far >= AHEAD_M / cell_m:
+            return -1
+        to = Spot(memory["way_u"][k], memory["way_v"][k])
+        far += math.sqrt((to.u - at.u) ** 2 + (to.v - at.v) ** 2)
+        at, same = to, False
         for j in range(memory["asked_n"]):
             du, dv = memory["asked_u"][j] - memory["way_u"][k], memory["asked_v"][j] - memory["way_v"][k]
             same = same or du * du + dv * dv < SAME * SAME
@@ -247,12 +255,16 @@ def _first_new(memory: Row) -> int:
 
 
 @jit_inner
-def _note_asked(see: View, memory: Row) -> None:
+def _note_asked(see: View, memory: Row, here: Spot, cell_m: float) -> None:
     """Note which way has been asked about, and whom in sight."""
-    n = min(memory["way_n"], MAX_CORNERS)
+    at, far, n = here, 0.0, 0
+    while n < min(memory["way_n"], MAX_CORNERS) and far < AHEAD_M / cell_m:
+        to = Spot(memory["way_u"][n], memory["way_v"][n])
+        far += math.sqrt((to.u - at.u) ** 2 + (to.v - at.v) ** 2)
+        memory["asked_u"][n], memory["asked_v"][n] = to.u, to.v
+        at = to
+        n += 1
     memory["asked_n"] = n
-    for k in range(n):
-        memory["asked_u"][k], memory["asked_v"][k] = memory["way_u"][k], memory["way_v"][k]
     for t in range(PEERS):
         k = slot_of(memory, see.shared["track_id"][t])
         if k >= 0:

@@ -13,7 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from swarmscope._jit import jit, jit_inline, jit_inner
-from swarmscope.onboard.mapping.cells import FULL, NODE, NODES, RIM, WIDE, node_place, open_way
+from swarmscope.geometry import point_segment_distance
+from swarmscope.onboard.mapping.cells import FULL, LEAST, NODE, NODES, RIM, WIDE, is_fine, node_place, open_way
 from swarmscope.onboard.mapping.memory import CORNERS
 from swarmscope.onboard.mapping.pages import NO_PAGE, PAGE_BITS
 from swarmscope.onboard.mapping.words import ONE, WORD, ZERO, Spot, bit, lowest, number, without_lowest
@@ -116,8 +117,7 @@ def _block(memory: Row, frame: Frame) -> None:
         _close_round(memory, frame, memory["stand_u"][k], memory["stand_v"][k], memory["stand_r"][k])
     for k in range(memory["kept_n"]):
         _close_round(memory, frame, memory["kept_u"][k], memory["kept_v"][k], memory["kept_r"][k])
-    for k in range(memory["heard_n"]):
-        _close_round(memory, frame, memory["heard_u"][k], memory["heard_v"][k], memory["disc_r"][FULL])
+    _close_told(memory, frame)
 
 
 @jit_inner
@@ -142,6 +142,43 @@ def _close_round(memory: Row, frame: Frame, u: float, v: float, r: float) -> Non
             x, y = kx - frame.ox, ky - frame.oy
             inside = 0 <= x < frame.words * WORD and 0 <= y < frame.height
             if inside and (NODE * kx + 2 - u) ** 2 + (NODE * ky + 2 - v) ** 2 < r * r:
+                for plane in range(3):
+                    memory["scratch"][_at(frame, plane, y, x >> 6)] |= bit(x & (WORD - 1))
+
+
+@jit_inner
+def _close_told(memory: Row, frame: Frame) -> None:
+    """Block the nodes that are too near to told cells, and to the line between two that nothing gets through between.
+
+    Without the lines a wall would leak between nodes.
+    """
+    r, first = memory["disc_r"][LEAST], 0
+    for a in range(memory["answers_n"]):
+        for k in range(first, first + memory["answer_n"][a]):
+            u, v = float(memory["heard_u"][k]), float(memory["heard_v"][k])
+            wu, wv = u, v
+            if k > first:
+                wu, wv = float(memory["heard_u"][k - 1]), float(memory["heard_v"][k - 1])
+                if (wu - u) ** 2 + (wv - v) ** 2 > 4.0 * r * r:
+                    wu, wv = u, v
+            _close_line(memory, frame, (wu, wv), (u, v), r)
+        first += memory["answer_n"][a]
+
+
+@jit_inner
+def _close_line(memory: Row, frame: Frame, start: tuple[float, float], end: tuple[float, float], r: float) -> None:
+    """Block the nodes within ``r`` of a line [cells]; those of the fine layer where they have been moved on to."""
+    low_x, high_x = min(start[0], end[0]) - r - NODE, max(start[0], end[0]) + r + NODE
+    low_y, high_y = min(start[1], end[1]) - r - NODE, max(start[1], end[1]) + r + NODE
+    for ky in range(int(math.floor(low_y / NODE)), int(math.floor(high_y / NODE)) + 1):
+        for kx in range(int(math.floor(low_x / NODE)), int(math.floor(high_x / NODE)) + 1):
+            x, y = kx - frame.ox, ky - frame.oy
+            if not (0 <= x < frame.words * WORD and 0 <= y < frame.height):
+                continue
+            u, v = float(NODE * kx + 2), float(NODE * ky + 2)
+            if is_fine(memory, u, v):
+                u, v = u + 2.0 * (memory["phase"] & 1), v + 2.0 * (memory["phase"] >> 1)
+            if point_segment_distance(u, v, start[0], start[1], end[0], end[1]) < r:
                 for plane in range(3):
                     memory["scratch"][_at(frame, plane, y, x >> 6)] |= bit(x & (WORD - 1))
 

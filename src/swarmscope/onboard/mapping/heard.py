@@ -67,7 +67,7 @@ def hear(memory: Row, cells: np.ndarray, n: int, now_s: float, sender: int) -> b
     box[0], box[1], box[2], box[3] = cells[0, 0], cells[0, 0], cells[0, 1], cells[0, 1]
     for k in range(n):
         u, v = cells[k, 0], cells[k, 1]
-        memory["heard_u"][first + k], memory["heard_v"][first + k] = u, v
+        memory["heard_u"][first + k], memory["heard_v"][first + k], memory["heard_free"][first + k] = u, v, 0
         box[0], box[1] = min(box[0], u), max(box[1], u)
         box[2], box[3] = min(box[2], v), max(box[3], v)
     memory["answer_n"][a], memory["answer_s"][a], memory["answer_wrong"][a] = n, now_s, 0
@@ -85,6 +85,7 @@ def drop_answer(memory: Row, a: int) -> None:
     n = number(memory["answer_n"][a])
     for k in range(first, memory["heard_n"] - n):
         memory["heard_u"][k], memory["heard_v"][k] = memory["heard_u"][k + n], memory["heard_v"][k + n]
+        memory["heard_free"][k] = memory["heard_free"][k + n]
     memory["heard_n"] -= n
     memory["answers_n"] -= 1
     for k in range(a, memory["answers_n"]):
@@ -110,7 +111,8 @@ def note_wrong(memory: Row, k: int, now_s: float) -> None:
     for a in range(memory["answers_n"]):
         n = number(memory["answer_n"][a])
         if first <= k < first + n:
-            memory["answer_wrong"][a] += 1
+            memory["answer_wrong"][a] += 1 - memory["heard_free"][k]
+            memory["heard_free"][k] = 1
             if memory["answer_wrong"][a] >= min(WRONG, n):
                 at = number(memory["wrong_at"])
                 memory["wrong_id"][at], memory["wrong_s"][at] = memory["answer_from"][a], now_s

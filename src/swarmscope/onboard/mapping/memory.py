@@ -116,9 +116,10 @@ MAP = np.dtype(
         ("heard_n", np.int64),
         ("heard_u", np.float32, HEARD),  # [cells]
         ("heard_v", np.float32, HEARD),
+        ("heard_free", np.uint8, HEARD),  # 1: has been seen to be free
         ("answers_n", np.int64),
         ("answer_n", np.int16, ANSWERS),  # cells of each
-        ("answer_wrong", np.int16, ANSWERS),  # how often one of them was seen to be free
+        ("answer_wrong", np.int16, ANSWERS),  # how many of them have been seen to be free
         ("answer_s", np.float64, ANSWERS),  # when it came
         ("answer_from", np.int32, ANSWERS),  # whose it is
         ("answer_box", np.float32, (ANSWERS, 4)),  # from u to u, from v to v
@@ -182,7 +183,7 @@ def used_bytes(memory: Row) -> int:
     of_slims, of_scratch = sizes["slim"] // SLIM_PAGES, sizes["scratch"] // SCRATCH
     whole = sum(size for name, size in sizes.items() if name not in (*PER_PAGE, "slim", "scratch"))
     whole -= sizes["disc"] * unused_rows
-    if memory["asked_s"] == NEVER_S:
+    if memory["budget"] == 0.0:
         whole -= sum(sizes[name] for name in sizes if name.startswith(OF_SHARING))
     wanted = of_pages * memory["pages_n"] + of_slims * memory["slims_n"] + of_scratch * memory["scratch_n"]
     return int(whole + wanted)

@@ -15,6 +15,8 @@ from swarmscope.onboard.sharing.way_message import Place, unwrapped
 MET = 12
 """Robots whose frames are known at once."""
 NOBODY = -1
+FAR_OFF_M = 1.5
+"""A robot is no farther from where its last packets had it: a longer way than in some late ticks is a lie."""
 USUAL = 8
 """A shift is the mean of about so many last ones."""
 
@@ -32,17 +34,23 @@ def slot_of(memory: Row, address: int) -> int:
 def note_met(memory: Row, who: tuple[int, int], theirs: Place, ours: Spot, cell_m: float) -> int:
     """Note where a robot is in its own frame and in ours; return where that is noted.
 
-    ``who`` is its address and its boot number: one that has restarted has a new frame.
+    ``who`` is its address and its boot number: one that has restarted has a new frame. Who says that it is far from
+    where it should be is not believed (NOBODY); what was known of it is forgotten when it says so again and again.
     """
     k = slot_of(memory, who[0])
     if k < 0 or number(memory["met_boot"][k]) != who[1]:
         k = _free_slot(memory) if k < 0 else k
-        memory["met_told_s"][k] = memory["met_asked_s"][k] = NEVER_S
+        if number(memory["met_id"][k]) != who[0]:
+            memory["met_told_s"][k] = NEVER_S
+        memory["met_asked_s"][k] = NEVER_S
         memory["met_n"][k], memory["met_id"][k], memory["met_boot"][k] = 0, who[0], who[1]
     u, v = ours.u, ours.v
     n = number(memory["met_n"][k])
     if n > 0:
         there = known_at(memory, k, theirs, cell_m)
+        if (u - there.u) ** 2 + (v - there.v) ** 2 > (FAR_OFF_M / cell_m) ** 2:
+            memory["met_n"][k] = 0 if n == 1 else n // 2
+            return NOBODY
         share = 1.0 / min(USUAL, n + 1)
         u, v = there.u + share * (u - there.u), there.v + share * (v - there.v)
     memory["met_n"][k] = min(USUAL, n + 1)

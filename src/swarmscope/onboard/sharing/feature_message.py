@@ -62,7 +62,7 @@ class FeatureMessage:
             raise PacketError(f"{STATUS_NAMES[status]} ({len(packet)} bytes)")
         kind, sender, seq, reply_to, n, boot = header.tolist()
         if not is_list(kind):
-            raise PacketError("is a request, not features" if is_request(kind) else "holds a network's features")
+            raise PacketError("is a request, not features" if is_request(kind) else "holds no list of features")
         angles, distances = np.zeros(n), np.zeros(n)
         read_features(data, data.size, float(range_max), angles, distances)
         return cls(sender, boot, seq, reply_to, tuple(angles.tolist()), tuple(distances.tolist()))

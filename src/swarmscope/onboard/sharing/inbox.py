@@ -2,8 +2,8 @@
 
 Bad packets (torn, corrupt, foreign) and stale ones (replayed, unasked for, answers to a question that is no longer
 open) are dropped and counted; nothing here raises or waits. Nothing here trusts a packet either: who has not been asked
-in the present round is not listened to, nobody is answered more often than ``peers.ANSWERS_PER_S``, and requests of
-others leave room in the outbox for our own.
+in the present round is not listened to, but for what closes ways, which is for all; nobody is answered more often than
+``peers.ANSWERS_PER_S``, and requests of others leave room in the outbox for our own.
 """
 
 from __future__ import annotations
@@ -104,12 +104,14 @@ def _is_overheard(see: View, header: np.ndarray) -> bool:
     says where it was long ago.
     """
     percept, shared = see.percept, see.shared
+    if take_request(see, header) < 0:
+        return False
     since = ahead_by(shared["asked_seq"], name_of(percept["boot"], header[3]))
     if shared["asked_seq"] >= 0 and 0 <= since < OWN_LAST:
         if since > 0 or percept["now_s"] - shared["asked_s"] > see.rig.sharing.max_age_s:
             shared["late_s"] = percept["now_s"]
         return False
-    return percept["now_s"] - shared["late_s"] > LATE_S and take_request(see, header) >= 0
+    return bool(percept["now_s"] - shared["late_s"] > LATE_S)
 
 
 @jit_inner
@@ -153,9 +155,9 @@ def _is_wanted(see: View, header: np.ndarray) -> bool:
             first = shared["asked_done"][a] == 0
             shared["asked_done"][a] = 1
             return bool(first)
-    if header[0] != KIND_CLOSED or shared["asked_n"] >= MAX_OUTBOX:
+    if header[0] != KIND_CLOSED or shared["asked_all"] == 0 or shared["asked_n"] >= MAX_OUTBOX:
         return False
-    a = shared["asked_n"]  # everybody was asked: who answers is noted now
+    a = shared["asked_n"]  # who answers is noted now
     shared["asked_id"][a], shared["asked_done"][a] = header[1], 1
     shared["asked_n"] = a + 1
     return True
@@ -192,6 +194,7 @@ def start_round(see: View) -> None:
     shared["asked_seq"] = shared["seq"]
     shared["asked_s"] = see.percept["now_s"]
     shared["asked_n"] = 0
+    shared["asked_all"] = 0
     shared["answers_n"] = 0
 
 
