@@ -2,8 +2,7 @@
 
 The way is closed where the least disc fits neither on it nor a little beside it. From what stands there the answer goes
 on along the wall, both ways, as far as the packet holds: who knows only where a way ends tries the place beside it
-next. Told is what the robot has seen itself; of what it has left behind, the middles of the nodes
-that are shut.
+next. Told is what the robot has seen itself; of what it has left behind, the middles of the nodes that are shut.
 """
 
 from __future__ import annotations
@@ -14,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from swarmscope._jit import jit, jit_inline, jit_inner
-from swarmscope.onboard.mapping.cells import LEAST, NODE, ask_for, fits, is_fine, is_set, row_of
+from swarmscope.onboard.mapping.cells import FULL, LEAST, NODE, ask_for, fits, is_fine, is_set, row_of
 from swarmscope.onboard.mapping.evidence import is_passed
 from swarmscope.onboard.mapping.pages import is_blocked, is_slim
 from swarmscope.onboard.mapping.words import WORD, ZERO, Spot, bit, lowest, number, without_lowest
@@ -65,7 +64,7 @@ def closed_place(
                 found, at_u, at_v = True, u, v
         if found:
             break
-    ask_for(memory, 0)
+    ask_for(memory, FULL)
     return found, at_u, at_v
 
 

@@ -118,6 +118,14 @@ def _find(see: View, memory: Row, talk: Talk, place: Place) -> int:
 
 
 @jit_inner
+def _from_there(memory: Row, there: Spot, n: int, cell_m: float) -> None:
+    """Turn the first ``n`` places of a packet, relative to its sender [m], into places of our own map [cells]."""
+    for k in range(n):
+        memory["talk_at"][k, 0] = there.u + memory["talk_at"][k, 0] / cell_m
+        memory["talk_at"][k, 1] = there.v + memory["talk_at"][k, 1] / cell_m
+
+
+@jit_inner
 def _answer(see: View, memory: Row, talk: Talk, packet: int) -> None:
     """Tell the sender of a CHECK what closes its way, if that is known and there is room on the air."""
     shared, out, now = see.shared, see.out, see.percept["now_s"]
@@ -128,9 +136,7 @@ def _answer(see: View, memory: Row, talk: Talk, packet: int) -> None:
         return
     there = known_at(memory, who, place, talk.cell_m)
     n = read_check(data, length, memory["talk_at"])
-    for k in range(n):
-        memory["talk_at"][k, 0] = there.u + memory["talk_at"][k, 0] / talk.cell_m
-        memory["talk_at"][k, 1] = there.v + memory["talk_at"][k, 1] / talk.cell_m
+    _from_there(memory, there, n, talk.cell_m)
     reach = talk.reach_m / talk.cell_m
     closed, u, v = closed_place(see, memory, talk.cell_m, memory["talk_at"], (n, reach))
     if not closed:
@@ -169,9 +175,7 @@ def _take_in(see: View, memory: Row, talk: Talk, packet: int) -> None:
         return
     there = known_at(memory, who, place, talk.cell_m)
     n = read_closed(data, length, memory["talk_at"])
-    for k in range(n):
-        memory["talk_at"][k, 0] = there.u + memory["talk_at"][k, 0] / talk.cell_m
-        memory["talk_at"][k, 1] = there.v + memory["talk_at"][k, 1] / talk.cell_m
+    _from_there(memory, there, n, talk.cell_m)
     if n <= 0 or not hear(memory, memory["talk_at"], n, see.percept["now_s"], see.header[1]):
         return
     memory["heard"] += 1
@@ -237,15 +241,22 @@ def _who_is_there(see: View, memory: Row, talk: Talk) -> tuple[bool, bool]:
 
 
 @jit_inner
+def _corners_ahead(memory: Row, here: Spot, cell_m: float) -> int:
+    """Return how many corners of the way are asked about."""
+    at, far, n = here, 0.0, 0
+    while n < min(memory["way_n"], MAX_CORNERS) and far < AHEAD_M / cell_m:
+        to = Spot(memory["way_u"][n], memory["way_v"][n])
+        far += math.sqrt((to.u - at.u) ** 2 + (to.v - at.v) ** 2)
+        at = to
+        n += 1
+    return n
+
+
+@jit_inner
 def _first_new(memory: Row, here: Spot, cell_m: float) -> int:
     """Return the first corner of the way that was not asked about, as far as it is asked about; -1: all were."""
-    at, far = here, 0.0
-    for k in range(min(memory["way_n"], MAX_CORNERS)):
-        if far >= AHEAD_M / cell_m:
-            return -1
-        to = Spot(memory["way_u"][k], memory["way_v"][k])
-        far += math.sqrt((to.u - at.u) ** 2 + (to.v - at.v) ** 2)
-        at, same = to, False
+    for k in range(_corners_ahead(memory, here, cell_m)):
+        same = False
         for j in range(memory["asked_n"]):
             du, dv = memory["asked_u"][j] - memory["way_u"][k], memory["asked_v"][j] - memory["way_v"][k]
             same = same or du * du + dv * dv < SAME * SAME
@@ -257,14 +268,10 @@ def _first_new(memory: Row, here: Spot, cell_m: float) -> int:
 @jit_inner
 def _note_asked(see: View, memory: Row, here: Spot, cell_m: float) -> None:
     """Note which way has been asked about, and whom in sight."""
-    at, far, n = here, 0.0, 0
-    while n < min(memory["way_n"], MAX_CORNERS) and far < AHEAD_M / cell_m:
-        to = Spot(memory["way_u"][n], memory["way_v"][n])
-        far += math.sqrt((to.u - at.u) ** 2 + (to.v - at.v) ** 2)
-        memory["asked_u"][n], memory["asked_v"][n] = to.u, to.v
-        at = to
-        n += 1
+    n = _corners_ahead(memory, here, cell_m)
     memory["asked_n"] = n
+    for k in range(n):
+        memory["asked_u"][k], memory["asked_v"][k] = memory["way_u"][k], memory["way_v"][k]
     for t in range(PEERS):
         k = slot_of(memory, see.shared["track_id"][t])
         if k >= 0:

@@ -324,16 +324,16 @@ def is_open(memory: Row, u: float, v: float) -> bool:
     return fits(memory, u, v) and not _in_the_way(memory, u, v)
 
 
-@jit
-def is_seen_open(memory: Row, u: float, v: float) -> bool:
-    """Tell whether the robot may be at (u, v) by the cells of the fine layer alone."""
-    return is_fine(memory, u, v) and _disc_fits(memory, u, v) and not _in_the_way(memory, u, v)
-
-
 @jit_inline
 def fits_seen(memory: Row, u: float, v: float) -> bool:
     """Tell whether the disc fits at (u, v) by the cells of the fine layer alone, whoever stands there."""
     return is_fine(memory, u, v) and _disc_fits(memory, u, v)
+
+
+@jit
+def is_seen_open(memory: Row, u: float, v: float) -> bool:
+    """Tell whether the robot may be at (u, v) by the cells of the fine layer alone."""
+    return fits_seen(memory, u, v) and not _in_the_way(memory, u, v)
 
 
 @jit_inline
