@@ -80,13 +80,6 @@ def test_enough_cells_that_are_seen_free_make_the_whole_answer_wrong():
     assert memory["answers_n"] == 0
 
 
-def test_what_is_known_already_is_not_taken_in_again():
-    memory = map_of()
-    assert told(memory, WALL)
-    assert not told(memory, WALL[3:9])
-    assert memory["answers_n"] == 1
-
-
 def test_old_answers_go():
     memory = map_of()
     told(memory, WALL, now_s=1.0)

@@ -128,6 +128,24 @@ def test_a_closed_comes_out_as_it_went_in(x, y, offsets):
     assert np.abs(found - wanted[: len(found)]).max() <= PLACE_M / 2 + 1e-9
 
 
+def test_a_step_that_is_repeated_takes_a_byte_for_fifteen():
+    wall = [(4 * k, 0) for k in range(19)] + [(72, 4 * k) for k in range(1, 9)]
+    packet = closed((0.0, 0.0), wall)
+    assert packet[CLOSED_HEAD:-2].tolist() == [0, 0, 0, 0x04, 0xF8, 0x18, 0x40, 0x68]
+    assert np.allclose(cells_of(packet) / CELL_M, np.array(wall) + 0.5)
+
+
+@for_any(st.lists(st.tuples(st.integers(-9, 9), st.integers(-9, 9), st.integers(1, 40)), min_size=1, max_size=6))
+def test_rows_of_cells_come_out_as_they_went_in(rows):
+    cells = [(0, 0)]
+    for dx, dy, times in rows:
+        cells += [(cells[-1][0] + dx * k, cells[-1][1] + dy * k) for k in range(1, times + 1)]
+    packet = closed((0.0, 0.0), cells[:112])
+    found = cells_of(packet) / CELL_M
+    assert np.allclose(found, np.array(cells[: len(found)]) + 0.5)
+    assert len(found) == len(cells[:112]) or packet.size > MAX_PACKET_BYTES - 5
+
+
 def test_forty_cells_beside_one_another_fit_into_sixty_bytes():
     wall = [(k * 4, k % 2) for k in range(-20, 20)]
     packet = closed((0.0, 0.0), wall, most=60)

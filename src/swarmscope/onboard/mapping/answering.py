@@ -1,8 +1,7 @@
-"""What a robot tells who asks whether its way is closed: the cells of its own map that close it, thinned out.
+"""Whether the way of somebody who asks is closed by the own map, and by which cells for sure.
 
-The way is closed where the least disc fits neither on it nor a little beside it. From what stands there the answer goes
-on along the wall, both ways, as far as the packet holds: who knows only where a way ends tries the place beside it
-next. Told is what the robot has seen itself; of what it has left behind, the middles of the nodes that are shut.
+The way is closed where the least disc fits neither on it nor, moved aside a little, close by. Told is what the robot
+has seen itself; of what it has left behind, the middles of the nodes that are shut.
 """
 
 from __future__ import annotations
@@ -12,28 +11,22 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmscope._jit import jit, jit_inline, jit_inner
+from swarmscope._jit import jit, jit_inner
 from swarmscope.onboard.mapping.cells import FULL, LEAST, NODE, ask_for, fits, is_fine, is_set, row_of
 from swarmscope.onboard.mapping.evidence import is_passed
 from swarmscope.onboard.mapping.pages import is_blocked, is_slim
-from swarmscope.onboard.mapping.words import WORD, ZERO, Spot, bit, lowest, number, without_lowest
+from swarmscope.onboard.mapping.words import ZERO, Spot, bit, lowest, without_lowest
 from swarmscope.onboard.percept import Row
 from swarmscope.onboard.view import View
 
 STRIDE = 2.0
 """Cells from place to place along a way."""
-ASIDE = 3.0
-"""A way is closed where it is so many cells beside it, twice as many, and in itself."""
+ASIDE = (-6.0, -3.0, 3.0, 6.0)
+"""A way is closed where it is in itself, and moved aside by so many cells, ..."""
+SLANTED = 12
+"""... not more than so many strides before or behind: it may meet a wall at a slant."""
 AT_WALL = 6
 """What closes a place is no more than so many cells from it."""
-APART = 3.0
-"""Told cells are so far from one another at least [cells]: nothing fits between two neighbours."""
-JOINED = 4
-"""What is so many cells from a cell along either axis belongs to the same thing: nobody gets through between."""
-_HALF = 64
-"""Cells either side of where the wall was met that are looked at."""
-_SEEN = 2 * _HALF * 2 * _HALF // WORD
-_MOST = 4096
 
 
 @jit
@@ -79,32 +72,43 @@ class Leg(NamedTuple):
 
 @jit_inner
 def _is_walled(see: View, memory: Row, cell: float, at: Leg) -> bool:
-    """Tell whether nothing fits at a place of a way, nor beside it."""
-    for k in range(5):
-        aside = ASIDE * (k - 2)
-        if fits(memory, at.u - aside * at.ev, at.v + aside * at.eu):
+    """Tell whether nothing fits at a place of a way, nor anywhere along it there when it is moved aside a little."""
+    if fits(memory, at.u, at.v):
+        return False
+    for side in ASIDE:
+        if not _is_barred(memory, Leg(at.u - side * at.ev, at.v + side * at.eu, at.eu, at.ev)):
             return False
-    return _wall_at(see, memory, cell, (at.u, at.v))[0]
+    return wall_at(see, memory, cell, (at.u, at.v))[0]
 
 
 @jit_inner
-def _wall_at(see: View, memory: Row, cell: float, at: tuple[float, float]) -> tuple[bool, int, int]:
+def _is_barred(memory: Row, at: Leg) -> bool:
+    """Tell whether nothing fits somewhere along a way, not far before or behind a place of it."""
+    for k in range(2 * SLANTED + 1):
+        along = STRIDE * (k - SLANTED)
+        if not fits(memory, at.u + along * at.eu, at.v + along * at.ev):
+            return True
+    return False
+
+
+@jit
+def wall_at(see: View, memory: Row, cell: float, at: tuple[float, float]) -> tuple[bool, int, int]:
     """Return the cell nearest to a place in which something stands for sure, and whether there is one."""
     cx, cy = int(math.floor(at[0])), int(math.floor(at[1]))
     best, at_x, at_y = AT_WALL * AT_WALL + 1, 0, 0
     for iy in range(cy - AT_WALL, cy + AT_WALL + 1):
-        row = _things(memory, cx - AT_WALL, iy, 2 * AT_WALL + 1)
+        row = things(memory, cx - AT_WALL, iy, 2 * AT_WALL + 1)
         while row != ZERO:
             ix = cx - AT_WALL + lowest(row)
             row = without_lowest(row)
             d = (ix - cx) ** 2 + (iy - cy) ** 2
-            if d < best and _is_sure(see, memory, cell, ix, iy):
+            if d < best and is_sure(see, memory, cell, ix, iy):
                 best, at_x, at_y = d, ix, iy
     return best <= AT_WALL * AT_WALL, at_x, at_y
 
 
-@jit_inner
-def _things(memory: Row, ix: int, iy: int, n: int) -> np.uint64:
+@jit
+def things(memory: Row, ix: int, iy: int, n: int) -> np.uint64:
     """Return in which of ``n`` cells of a row something stands: beyond the fine layer, in the middles of shut nodes."""
     if is_fine(memory, float(ix), float(iy)) and is_fine(memory, float(ix + n), float(iy)):
         return row_of(memory, ix, iy) & (bit(n) - bit(0))
@@ -119,8 +123,8 @@ def _things(memory: Row, ix: int, iy: int, n: int) -> np.uint64:
     return row
 
 
-@jit_inner
-def _is_sure(see: View, memory: Row, cell: float, ix: int, iy: int) -> bool:
+@jit
+def is_sure(see: View, memory: Row, cell: float, ix: int, iy: int) -> bool:
     """Tell whether what stands in a cell closes it to the least disc, too, for all that is known, and is not gone.
 
     What came back from the place layer is one cell a node; where the least disc did fit at the node, it says nothing.
@@ -130,85 +134,3 @@ def _is_sure(see: View, memory: Row, cell: float, ix: int, iy: int) -> bool:
     if at_node and is_slim(memory, ix // NODE, iy // NODE):
         return False
     return not is_passed(see, ix + 0.5 - see.shared["x"] / cell, iy + 0.5 - see.shared["y"] / cell, cell)
-
-
-@jit
-def trace(see: View, memory: Row, cell: float, place: tuple[float, float], terms: tuple[int, float]) -> int:
-    """Write what closes a place into ``memory["talk_cell"]``, nearest to it first; return how many.
-
-    ``terms``: how many at most, and how far [cells] from the robot along an axis.
-    """
-    most, reach = terms
-    here = Spot(see.shared["x"] / cell, see.shared["y"] / cell)
-    found, sx, sy = _wall_at(see, memory, cell, place)
-    if not found:
-        return 0
-    scratch = memory["scratch"]
-    memory["scratch_n"] = max(memory["scratch_n"], _SEEN + _MOST)
-    for k in range(_SEEN):
-        scratch[k] = ZERO
-    first, last, n = 0, 0, 0
-    last = _meet(memory, (sx, sy), (sx, sy), last)
-    while first < last and n < most:
-        word = number(scratch[_SEEN + first])
-        first += 1
-        ix, iy = sx - _HALF + (word & 127), sy - _HALF + (word >> 7)
-        if abs(ix + 0.5 - here.u) > reach or abs(iy + 0.5 - here.v) > reach:
-            continue
-        if _is_apart(memory, n, ix, iy):
-            memory["talk_cell"][n, 0], memory["talk_cell"][n, 1] = ix, iy
-            n += 1
-        for y in range(iy - JOINED, iy + JOINED + 1):
-            row = _things(memory, ix - JOINED, y, 2 * JOINED + 1)
-            while row != ZERO:
-                x = ix - JOINED + lowest(row)
-                row = without_lowest(row)
-                if _is_sure(see, memory, cell, x, y):
-                    last = _meet(memory, (sx, sy), (x, y), last)
-    return n
-
-
-@jit_inner
-def _meet(memory: Row, start: tuple[int, int], cell: tuple[int, int], last: int) -> int:
-    """Put a cell into the queue that ends at ``last`` if it has not been there yet; return where the queue ends."""
-    x, y = cell[0] - start[0] + _HALF, cell[1] - start[1] + _HALF
-    if not (0 <= x < 2 * _HALF and 0 <= y < 2 * _HALF) or last >= _MOST:
-        return last
-    at = (y * 2 * _HALF + x) // WORD
-    if memory["scratch"][at] & bit(x & (WORD - 1)):
-        return last
-    memory["scratch"][at] |= bit(x & (WORD - 1))
-    memory["scratch"][_SEEN + last] = np.uint64(y * 128 + x)
-    return last + 1
-
-
-@jit_inline
-def _is_apart(memory: Row, n: int, ix: int, iy: int) -> bool:
-    """Tell whether a cell is far enough from the first ``n`` that are told."""
-    for k in range(n):
-        dx, dy = memory["talk_cell"][k, 0] - ix, memory["talk_cell"][k, 1] - iy
-        if dx * dx + dy * dy < APART * APART:
-            return False
-    return True
-
-
-@jit
-def put_in_a_row(memory: Row, n: int) -> None:
-    """Order the first ``n`` told cells so that each is the nearest to the one before: steps get short."""
-    cells = memory["talk_cell"]
-    _swap(memory, 0, n - 1)
-    for k in range(1, n):
-        best, at = 2**40, k
-        for j in range(k, n):
-            d = (cells[j, 0] - cells[k - 1, 0]) ** 2 + (cells[j, 1] - cells[k - 1, 1]) ** 2
-            if d < best:
-                best, at = d, j
-        _swap(memory, k, at)
-
-
-@jit_inner
-def _swap(memory: Row, i: int, j: int) -> None:
-    cells = memory["talk_cell"]
-    x, y = cells[i, 0], cells[i, 1]
-    cells[i, 0], cells[i, 1] = cells[j, 0], cells[j, 1]
-    cells[j, 0], cells[j, 1] = x, y

@@ -11,12 +11,14 @@ import math
 from typing import NamedTuple
 
 from swarmscope._jit import jit, jit_inline, jit_inner
-from swarmscope.onboard.mapping.answering import closed_place, put_in_a_row, trace
+from swarmscope.onboard.mapping.answering import closed_place
 from swarmscope.onboard.mapping.cells import LEAST
 from swarmscope.onboard.mapping.evidence import closes, is_passed
 from swarmscope.onboard.mapping.heard import distrusts, hear, note_wrong, review_heard
 from swarmscope.onboard.mapping.memory import TALK
 from swarmscope.onboard.mapping.met import NOBODY, is_known, known_at, note_met, slot_of
+from swarmscope.onboard.mapping.news import keep_news
+from swarmscope.onboard.mapping.tracing import trace
 from swarmscope.onboard.mapping.words import Spot
 from swarmscope.onboard.percept import EVERYBODY, MAX_OUTBOX, NEVER_S, PEERS, Row
 from swarmscope.onboard.sharing.inbox import start_round
@@ -40,8 +42,12 @@ EVERY = 8
 """A told cell is looked at for being free in one tick of so many."""
 SAME = 4.0
 """A corner so near [cells] to one that was asked about is the same."""
-AHEAD_M = 20.0
+AHEAD_M = 40.0
 """So much of the way is asked about."""
+SMALL_M = 1.5
+"""What is smaller along both axes is not told: the way round it is hardly longer."""
+TRIES = 3
+"""What does not fit into a packet is traced anew, with fewer cells, so often."""
 
 
 class Talk(NamedTuple):
@@ -128,11 +134,11 @@ def _from_there(memory: Row, there: Spot, n: int, cell_m: float) -> None:
 @jit_inner
 def _answer(see: View, memory: Row, talk: Talk, packet: int) -> None:
     """Tell the sender of a CHECK what closes its way, if that is known and there is room on the air."""
-    shared, out, now = see.shared, see.out, see.percept["now_s"]
+    now = see.percept["now_s"]
     data, length = see.percept["packet"][packet], see.percept["packet_length"][packet]
     place = read_place(data, 7)
     who = _find(see, memory, talk, place)
-    if who < 0 or out["n_out"] >= MAX_OUTBOX or memory["budget"] <= 0.0 or now - memory["met_told_s"][who] < talk.ask_s:
+    if who < 0 or not _may_send(see, memory) or now - memory["met_told_s"][who] < talk.ask_s:
         return
     there = known_at(memory, who, place, talk.cell_m)
     n = read_check(data, length, memory["talk_at"])
@@ -141,20 +147,56 @@ def _answer(see: View, memory: Row, talk: Talk, packet: int) -> None:
     closed, u, v = closed_place(see, memory, talk.cell_m, memory["talk_at"], (n, reach))
     if not closed:
         return
-    n = trace(see, memory, talk.cell_m, (u, v), (min(TALK, talk.cells), reach))
-    if n == 0:
-        return
-    put_in_a_row(memory, n)
-    _to_lattice(memory, n, talk.cell_m)
-    shared["seq"] = (shared["seq"] + 1) & 0xFFFF
-    head = Head(see.percept["id"], see.percept["boot"], shared["seq"], name_of(see.header[5], see.header[2]))
-    k = out["n_out"]
-    length = encode_closed(head, own_place(see), memory["talk_cell"], n, out["out"][k], talk.payload)
-    if length > 0:
-        out["out_to"][k], out["out_length"][k], out["n_out"] = EVERYBODY, length, k + 1
-        memory["budget"] -= length
+    if _tell(see, memory, talk, (u, v), name_of(see.header[5], see.header[2])):
         memory["met_told_s"][who] = now
-        memory["told"] += 1
+
+
+@jit_inner
+def _tell(see: View, memory: Row, talk: Talk, place: tuple[float, float], reply_to: int) -> bool:
+    """Tell everybody what closes a place [cells]; return whether there was something to tell."""
+    out = see.out
+    length = _write_closed(see, memory, talk, place, reply_to)
+    if length == 0:
+        return False
+    k = out["n_out"]
+    out["out_to"][k], out["out_length"][k], out["n_out"] = EVERYBODY, length, k + 1
+    memory["budget"] -= length
+    memory["told"] += 1
+    return True
+
+
+@jit_inner
+def _write_closed(see: View, memory: Row, talk: Talk, place: tuple[float, float], reply_to: int) -> int:
+    """Write what closes a place [cells] into the outbox, in answer to question ``reply_to``.
+
+    Return its length, 0: there is none, or it is small. What is nearest to the place is told, as much of it as fits.
+    """
+    shared, data = see.shared, see.out["out"][see.out["n_out"]]
+    shared["seq"] = (shared["seq"] + 1) & 0xFFFF
+    head = Head(see.percept["id"], see.percept["boot"], shared["seq"], reply_to)
+    most, length = min(TALK, talk.cells), 0
+    for _ in range(TRIES):
+        n = trace(see, memory, talk.cell_m, place, (most, talk.reach_m / talk.cell_m))
+        if _is_small(memory, n, SMALL_M / talk.cell_m):
+            return 0
+        _to_lattice(memory, n, talk.cell_m)
+        length = encode_closed(head, own_place(see), memory["talk_cell"], n, data, talk.payload)
+        most = read_closed(data, length, memory["talk_at"])
+        if most >= n:
+            break
+    return int(length)
+
+
+@jit_inner
+def _is_small(memory: Row, n: int, small: float) -> bool:
+    """Tell whether the first ``n`` cells to tell lie within ``small`` [cells] along both axes."""
+    for axis in range(2):
+        low, high = memory["talk_cell"][0, axis], memory["talk_cell"][0, axis]
+        for k in range(n):
+            low, high = min(low, memory["talk_cell"][k, axis]), max(high, memory["talk_cell"][k, axis])
+        if high - low >= small:
+            return False
+    return True
 
 
 @jit_inner
@@ -176,7 +218,8 @@ def _take_in(see: View, memory: Row, talk: Talk, packet: int) -> None:
     there = known_at(memory, who, place, talk.cell_m)
     n = read_closed(data, length, memory["talk_at"])
     _from_there(memory, there, n, talk.cell_m)
-    if n <= 0 or not hear(memory, memory["talk_at"], n, see.percept["now_s"], see.header[1]):
+    n = keep_news(memory, memory["talk_at"], n)
+    if not hear(memory, memory["talk_at"], n, see.percept["now_s"], see.header[1]):
         return
     memory["heard"] += 1
     here = Spot(see.shared["x"] / talk.cell_m, see.shared["y"] / talk.cell_m)
@@ -188,6 +231,12 @@ def _take_in(see: View, memory: Row, talk: Talk, packet: int) -> None:
             return
 
 
+@jit_inline
+def _may_send(see: View, memory: Row) -> bool:
+    """Tell whether there is room on the air, and in this tick."""
+    return bool(see.out["n_out"] < MAX_OUTBOX and memory["budget"] > 0.0)
+
+
 @jit
 def ask(see: View, memory: Row, talk: Talk, here: Spot) -> None:
     """Ask everybody who may hear it whether the way is closed, if there is reason to, and room on the air."""
@@ -195,7 +244,7 @@ def ask(see: View, memory: Row, talk: Talk, here: Spot) -> None:
     if memory["asked_s"] == NEVER_S:
         memory["asked_s"] = now - talk.ask_s * (1.0 - see.percept["id"] % TURNS / TURNS)  # not all at once
     since = now - memory["asked_s"]
-    if since < talk.ask_s or memory["way_n"] == 0 or out["n_out"] >= MAX_OUTBOX or memory["budget"] <= 0.0:
+    if since < talk.ask_s or memory["way_n"] == 0 or not _may_send(see, memory):
         return
     anybody, new_face = _who_is_there(see, memory, talk)
     if not anybody:

@@ -12,9 +12,9 @@ from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.onboard.mapping.words import number
 from swarmscope.onboard.percept import Row
 
-HEARD = 384
+HEARD = 512
 """Cells that are remembered at once."""
-ANSWERS = 12
+ANSWERS = 24
 """Answers that are."""
 WRONG = 3
 """So many cells of an answer that turn out to be free make all of it wrong."""
@@ -30,6 +30,12 @@ def is_told_closed(memory: Row, u: float, v: float) -> bool:
     if memory["answers_n"] == 0:
         return False
     return _is_within(memory, u, v, memory["disc_r"][LEAST])
+
+
+@jit_inline
+def is_told_near(memory: Row, u: float, v: float) -> bool:
+    """Tell whether others have told of (u, v) [cells], or of what is so near that it closes the same."""
+    return _is_within(memory, u, v, 0.5 * memory["disc_r"][LEAST])
 
 
 @jit_inner
@@ -50,15 +56,11 @@ def _is_within(memory: Row, u: float, v: float, r: float) -> bool:
 
 @jit
 def hear(memory: Row, cells: np.ndarray, n: int, now_s: float, sender: int) -> bool:
-    """Take in the middles of ``n`` cells (n, 2) [cells]; return whether there is anything new. The oldest give way.
+    """Take in the middles of ``n`` cells (n, 2) [cells]; return whether there is room for them. The oldest give way.
 
     Who has told wrong things is not believed for a while (`distrusts`).
     """
-    r = memory["disc_r"][LEAST]
-    new = False
-    for k in range(n):
-        new = new or not _is_within(memory, cells[k, 0], cells[k, 1], 0.5 * r)
-    if not new or n > HEARD:
+    if not 0 < n <= HEARD:
         return False
     while memory["answers_n"] == ANSWERS or memory["heard_n"] + n > HEARD:
         drop_answer(memory, 0)

@@ -147,7 +147,7 @@ MAP = np.dtype(
         ("told", np.int32),
         ("heard", np.int32),
         ("changed", np.int32),
-        ("talk_at", np.float64, (TALK, 2)),  # scratch of packets
+        ("talk_at", np.float32, (TALK, 2)),  # scratch of packets
         ("talk_cell", np.int32, (TALK, 2)),
     ]
 )

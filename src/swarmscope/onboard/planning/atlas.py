@@ -132,9 +132,9 @@ class Params(NamedTuple):
     """Time between two questions, and between two answers to the same robot, at least."""
     ask_again_s: Seconds = 6.0
     """Time between two questions where somebody may hear them and nothing is new, at most."""
-    reach_m: Annotated[float, Bounds(0.0, 100.0, "m")] = 12.0
+    reach_m: Annotated[float, Bounds(0.0, 100.0, "m")] = 25.0
     """What is farther from the one who answers is not told."""
-    cells: Annotated[int, Bounds(1, 112)] = 40
+    cells: Annotated[int, Bounds(1, 112)] = 100
     """Cells that an answer has at most."""
     payload: Annotated[int, Bounds(50, 140, "B")] = 60
     """Bytes that a packet has at most."""

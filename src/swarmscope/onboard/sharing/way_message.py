@@ -34,6 +34,9 @@ _NEAR = 7
 """Steps from cell to cell that one byte holds along either axis."""
 _LEAP = 0x88
 """What no step is coded as: the next three bytes name a cell anew."""
+_AGAIN = 8
+"""What no step has in its lower half: the last step is repeated, as often as `_times` says of the upper half."""
+_AGAIN_MOST = 15
 
 
 class Place(NamedTuple):
@@ -141,7 +144,8 @@ def encode_closed(head: Head, place: Place, cells: np.ndarray, n: int, out: np.n
     """Write a CLOSED of at most ``most`` bytes into ``out`` uint8; return its length, 0: nothing fits.
 
     ``cells (n, 2)`` are numbers of cells of `CELL_M` of the sender's frame, none farther than 127 m from it along an
-    axis. Those that come first are sent; what is near the cell before takes one byte, else four.
+    axis. Those that come first are sent; what is near the cell before takes one byte, else four; the same step again
+    and again, up to 15 times, takes one more.
     """
     most = min(most, out.size)
     n = min(n, cells.shape[0])
@@ -151,15 +155,26 @@ def encode_closed(head: Head, place: Place, cells: np.ndarray, n: int, out: np.n
         return 0
     put_answer_head(out, KIND_CLOSED, head)
     _put_place(out, 9, place)
+    dx, dy, again = 0, 0, 0
     for k in range(n):
-        dx, dy = cells[k, 0] - x, cells[k, 1] - y
+        was_x, was_y, dx, dy = dx, dy, cells[k, 0] - x, cells[k, 1] - y
         near = k > 0 and abs(dx) <= _NEAR and abs(dy) <= _NEAR
-        if at + (1 if near else 3 + min(1, k)) + 2 > most:
+        same = near and (dx, dy) == (was_x, was_y)
+        if same and 0 < again < _AGAIN_MOST:
+            again += 1
+            out[at - 1] = _AGAIN | (_half_of(again) << 4)
+        elif at + (1 if near else 3 + min(1, k)) + 2 > most:
             break
-        if near:
+        elif same:
+            again = 1
+            out[at] = _AGAIN | (_half_of(again) << 4)
+            at += 1
+        elif near:
+            again = 0
             out[at] = (dx & 0xF) | ((dy & 0xF) << 4)
             at += 1
         else:
+            again, dx, dy = 0, 0, 0
             if k > 0:
                 out[at] = _LEAP
                 at += 1
@@ -168,6 +183,18 @@ def encode_closed(head: Head, place: Place, cells: np.ndarray, n: int, out: np.n
         x, y = cells[k, 0], cells[k, 1]
     out[CLOSED_HEAD - 1] = at - CLOSED_HEAD
     return put_checksum(out, at)
+
+
+@jit_inline
+def _half_of(times: int) -> int:
+    """Return the upper half of the byte that repeats a step so often, 1 to 15: there is no 8, which is the leap's."""
+    return times - 1 if times <= _AGAIN else times
+
+
+@jit_inline
+def _times(half: int) -> int:
+    """Return how often the byte with this upper half repeats the step."""
+    return half + 1 if half < _AGAIN else half
 
 
 @jit
@@ -183,19 +210,33 @@ def read_closed(data: np.ndarray, length: int, cells: np.ndarray) -> int:
     place = read_place(data, 9)
     ox, oy = math.floor(place.x / CELL_M), math.floor(place.y / CELL_M)
     at, end, n, x, y = CLOSED_HEAD, length - 2, 0, 0, 0
-    anew = True
+    dx, dy, times, anew = 0, 0, 1, True
     while at < end and n < cells.shape[0]:
-        if not anew and int(data[at]) != _LEAP:
-            x, y = x + _signed(int(data[at]), 4), y + _signed(int(data[at]) >> 4, 4)
-            at += 1
-        else:
+        code = int(data[at])
+        if anew or code == _LEAP:
             at += 0 if anew else 1
             if at + 3 > end:
                 break
             x, y = _pair(data, at)
+            dx, dy, times = 0, 0, 0
             at += 3
+            n = _note_cell(cells, n, (ox + x, oy + y), place)
+        elif code & 0xF == _AGAIN:
+            times = _times(code >> 4)
+            at += 1
+        else:
+            dx, dy, times = _signed(code, 4), _signed(code >> 4, 4), 1
+            at += 1
         anew = False
-        cells[n, 0] = (ox + x + 0.5) * CELL_M - place.x
-        cells[n, 1] = (oy + y + 0.5) * CELL_M - place.y
-        n += 1
+        for _ in range(min(times, cells.shape[0] - n)):
+            x, y = x + dx, y + dy
+            n = _note_cell(cells, n, (ox + x, oy + y), place)
     return n
+
+
+@jit_inline
+def _note_cell(cells: np.ndarray, n: int, cell: tuple[int, int], place: Place) -> int:
+    """Write the middle of a cell, relative to the sender, as the ``n``-th; return how many there are."""
+    cells[n, 0] = (cell[0] + 0.5) * CELL_M - place.x
+    cells[n, 1] = (cell[1] + 0.5) * CELL_M - place.y
+    return n + 1
