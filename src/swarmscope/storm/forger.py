@@ -24,7 +24,7 @@ from swarmscope.onboard.sharing.message import (
     is_request,
     name_of,
 )
-from swarmscope.onboard.sharing.way_message import CELL_M, Place, encode_check, encode_closed
+from swarmscope.onboard.sharing.way_message import CELL_M, FRAMES, Place, encode_check, encode_closed
 from swarmscope.sim.radio import throw_all
 from swarmscope.sim.state import Sim
 
@@ -191,7 +191,8 @@ def _forged(rng: np.random.Generator, head: Head, out: np.ndarray) -> int:
 @jit_alloc
 def _place(rng: np.random.Generator) -> Place:
     """Return a place near where robots' frames begin, for that is where most say that they are."""
-    return Place(rng.uniform(-LONG, LONG), rng.uniform(-LONG, LONG))
+    names = 3 if rng.random() < 0.5 else FRAMES  # the lowest win
+    return Place(rng.uniform(-LONG, LONG), rng.uniform(-LONG, LONG), int(rng.integers(0, names)))
 
 
 @jit_alloc

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from helpers import DT, one_robot, rig_of, scan_at, tick, wall, world_of
 from swarmscope.onboard.edge import Seen
 from swarmscope.onboard.mapping.cells import FULL, LEAST, ask_for, fits_seen
+from swarmscope.onboard.mapping.frames import own_place
 from swarmscope.onboard.mapping.heard import hear, is_told_closed
 from swarmscope.onboard.mapping.memory import TALK
 from swarmscope.onboard.mapping.tracing import trace
@@ -171,8 +172,9 @@ def told_by(pair, cells, to=None, seq=1):
     out = np.zeros(MAX_PACKET_BYTES, np.uint8)
     to = name_of(int(percept["boot"]), int(shared["asked_seq"])) if to is None else to
     head = Head(KNOWS, 0, int(pair.knows.shared["seq"]) + seq, to)
-    cells = np.array(cells, np.int32)
-    return out[: encode_closed(head, Place(0.0, 0.0), cells, len(cells), out, MAX_PACKET_BYTES)].tobytes()
+    place = own_place(pair.knows.view, pair.knows.memory)
+    cells = np.add(cells, (round(place.x / CELL_M), round(place.y / CELL_M))).astype(np.int32)
+    return out[: encode_closed(head, place, cells, len(cells), out, MAX_PACKET_BYTES)].tobytes()
 
 
 def test_a_forged_wall_where_the_robot_sees_that_there_is_none_is_not_believed_for_long():
@@ -222,7 +224,7 @@ def test_a_packet_never_closes_what_is_free(cells, x, y):
     n = trace(bot.view, memory, CELL_M, (cells[0][0] + 0.5, cells[0][1] + 0.5), (TALK, 96.0))
     assert n > 0
     out = np.zeros(MAX_PACKET_BYTES, np.uint8)
-    place = Place(x, y)
+    place = Place(x, y, 1)
     ox, oy = math.floor(x / CELL_M), math.floor(y / CELL_M)
     numbers = memory["talk_cell"][:n] + np.array([ox, oy], np.int32)
     length = encode_closed(Head(1, 2, 3, 4), place, numbers, n, out, MAX_PACKET_BYTES)

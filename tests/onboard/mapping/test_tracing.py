@@ -16,7 +16,8 @@ from swarmscope.onboard.mapping.answering import closed_place
 from swarmscope.onboard.mapping.heard import hear, is_told_closed
 from swarmscope.onboard.mapping.memory import TALK
 from swarmscope.onboard.mapping.tracing import HALF, JOINED, apart, trace
-from swarmscope.onboard.sharing.way_message import CELL_M
+from swarmscope.onboard.sharing.message import Head
+from swarmscope.onboard.sharing.way_message import CELL_M, Place, encode_closed, read_closed
 
 FAR = 1000.0
 Y = 20
@@ -120,6 +121,16 @@ def test_everything_is_near_a_told_cell_unless_there_are_too_many(cells, most):
     assert all(math.dist(a, b) >= apart(memory) for k, a in enumerate(told) for b in told[:k])
     if len(told) < most:
         assert all(min(math.dist(cell, other) for other in told) < apart(memory) for cell in thing)
+
+
+def test_the_walls_of_a_room_fit_into_sixty_bytes(see):
+    room = [(ix, y) for ix in range(-48, 49) for y in (-32, 32)] + [(x, iy) for iy in range(-32, 33) for x in (-48, 48)]
+    memory = map_of(*room)
+    n = trace(see, memory, CELL_M, (20.5, 32.5), (100, FAR))
+    assert n >= 72  # of 20 m
+    out = np.zeros(60, np.uint8)
+    length = encode_closed(Head(1, 2, 3, 4), Place(0.0, 0.0, 1), memory["talk_cell"], n, out, 60)
+    assert read_closed(out, length, np.zeros((TALK, 2), np.float32)) == n
 
 
 def test_the_square_holds_what_an_answer_can():

@@ -14,23 +14,25 @@ from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.onboard.mapping.answering import closed_place
 from swarmscope.onboard.mapping.cells import LEAST
 from swarmscope.onboard.mapping.evidence import closes, is_passed
+from swarmscope.onboard.mapping.frames import agree, is_shared, keep_frame, own_place, shift_m, spot_of
 from swarmscope.onboard.mapping.heard import distrusts, hear, note_wrong, review_heard
 from swarmscope.onboard.mapping.memory import TALK
-from swarmscope.onboard.mapping.met import NOBODY, is_known, known_at, note_met, slot_of
+from swarmscope.onboard.mapping.met import note_heard, slot_of
 from swarmscope.onboard.mapping.news import keep_news
 from swarmscope.onboard.mapping.tracing import trace
 from swarmscope.onboard.mapping.words import Spot
 from swarmscope.onboard.percept import EVERYBODY, MAX_OUTBOX, NEVER_S, PEERS, Row
 from swarmscope.onboard.sharing.inbox import start_round
-from swarmscope.onboard.sharing.message import KIND_CHECK, MAX_CORNERS, OK, Head, decode, name_of
+from swarmscope.onboard.sharing.message import KIND_CHECK, OK, Head, decode, name_of
 from swarmscope.onboard.sharing.way_message import (
     CELL_M,
+    WAY_CORNERS,
     Place,
     encode_check,
     encode_closed,
+    place_of,
     read_check,
     read_closed,
-    read_place,
 )
 from swarmscope.onboard.view import View
 
@@ -69,13 +71,7 @@ class Talk(NamedTuple):
     keep_s: float
     """So long others are believed."""
     trust_m: float
-    """A robot that has gone so far since it saw another one does not know any more where that one's frame lies."""
-
-
-@jit_inline
-def own_place(see: View) -> Place:
-    """Return where the robot is."""
-    return Place(see.shared["x"], see.shared["y"])
+    """A robot that has gone so far without agreeing with one in sight begins anew in its own frame."""
 
 
 @jit
@@ -84,6 +80,7 @@ def listen(see: View, memory: Row, talk: Talk) -> None:
     percept, shared = see.percept, see.shared
     cap = talk.budget * SAVED_S
     memory["budget"] = min(cap, memory["budget"] + talk.budget * percept["dt_s"])
+    keep_frame(see, memory, talk.trust_m / talk.cell_m)
     review_heard(memory, percept["now_s"], talk.keep_s)
     _doubt(see, memory, talk.cell_m)
     for i in range(shared["told_n"]):
@@ -108,19 +105,24 @@ def _doubt(see: View, memory: Row, cell_m: float) -> None:
 
 
 @jit_inner
-def _find(see: View, memory: Row, talk: Talk, place: Place) -> int:
-    """Return where the sender of the packet in ``see.header`` is noted; if it is in sight, note where it is first.
+def _find(see: View, memory: Row, talk: Talk, place: Place) -> tuple[bool, Spot]:
+    """Return whether it is known where the sender of the packet in ``see.header`` is, and where [cells].
 
-    What it says of itself it said a tick ago.
+    What it says of itself it said a tick ago. Who is in sight is understood in any frame.
     """
-    shared, sender, boot = see.shared, see.header[1], see.header[5]
+    shared, sender, nowhere = see.shared, see.header[1], Spot(0.0, 0.0)
+    note_heard(memory, sender, see.percept["now_s"])
+    if place.frame == 0:
+        return False, nowhere
+    in_sight, x, y = False, 0.0, 0.0
     for t in range(PEERS):
         if shared["track_id"][t] == sender and shared["track_seen_s"][t] == see.percept["now_s"]:
-            u = (shared["x"] + shared["track_was_x"][t]) / talk.cell_m
-            v = (shared["y"] + shared["track_was_y"][t]) / talk.cell_m
-            return note_met(memory, (sender, boot), place, Spot(u, v), talk.cell_m)
-    k = slot_of(memory, sender)
-    return k if is_known(memory, k, boot, talk.trust_m / talk.cell_m) else NOBODY
+            in_sight, x, y = True, shared["x"] + shared["track_was_x"][t], shared["y"] + shared["track_was_y"][t]
+    if in_sight and not agree(memory, place, x, y):
+        return False, nowhere
+    if is_shared(memory, place):
+        return True, spot_of(see, memory, place, talk.cell_m)
+    return in_sight, Spot(x / talk.cell_m, y / talk.cell_m)
 
 
 @jit_inner
@@ -136,11 +138,10 @@ def _answer(see: View, memory: Row, talk: Talk, packet: int) -> None:
     """Tell the sender of a CHECK what closes its way, if that is known and there is room on the air."""
     now = see.percept["now_s"]
     data, length = see.percept["packet"][packet], see.percept["packet_length"][packet]
-    place = read_place(data, 7)
-    who = _find(see, memory, talk, place)
-    if who < 0 or not _may_send(see, memory) or now - memory["met_told_s"][who] < talk.ask_s:
+    known, there = _find(see, memory, talk, place_of(data))
+    who = slot_of(memory, see.header[1])
+    if not known or not _may_send(see, memory) or now - memory["met_told_s"][who] < talk.ask_s:
         return
-    there = known_at(memory, who, place, talk.cell_m)
     n = read_check(data, length, memory["talk_at"])
     _from_there(memory, there, n, talk.cell_m)
     reach = talk.reach_m / talk.cell_m
@@ -180,7 +181,7 @@ def _write_closed(see: View, memory: Row, talk: Talk, place: tuple[float, float]
         if _is_small(memory, n, SMALL_M / talk.cell_m):
             return 0
         _to_lattice(memory, n, talk.cell_m)
-        length = encode_closed(head, own_place(see), memory["talk_cell"], n, data, talk.payload)
+        length = encode_closed(head, own_place(see, memory), memory["talk_cell"], n, data, talk.payload)
         most = read_closed(data, length, memory["talk_at"])
         if most >= n:
             break
@@ -201,21 +202,20 @@ def _is_small(memory: Row, n: int, small: float) -> bool:
 
 @jit_inner
 def _to_lattice(memory: Row, n: int, cell_m: float) -> None:
-    """Turn numbers of cells of the map into those of the cells in which packets have them."""
+    """Turn numbers of cells of the map into those of the shared frame, which packets have."""
     for k in range(n):
         for axis in range(2):
-            memory["talk_cell"][k, axis] = int(math.floor((memory["talk_cell"][k, axis] + 0.5) * cell_m / CELL_M))
+            at = (memory["talk_cell"][k, axis] + 0.5) * cell_m + shift_m(memory, axis)
+            memory["talk_cell"][k, axis] = int(math.floor(at / CELL_M))
 
 
 @jit_inner
 def _take_in(see: View, memory: Row, talk: Talk, packet: int) -> None:
     """Take in what closes the way by another robot's map."""
     data, length = see.percept["packet"][packet], see.percept["packet_length"][packet]
-    place = read_place(data, 9)
-    who = _find(see, memory, talk, place)
-    if who < 0 or distrusts(memory, see.header[1], see.percept["now_s"], talk.keep_s):
+    known, there = _find(see, memory, talk, place_of(data))
+    if not known or distrusts(memory, see.header[1], see.percept["now_s"], talk.keep_s):
         return
-    there = known_at(memory, who, place, talk.cell_m)
     n = read_closed(data, length, memory["talk_at"])
     _from_there(memory, there, n, talk.cell_m)
     n = keep_news(memory, memory["talk_at"], n)
@@ -246,7 +246,7 @@ def ask(see: View, memory: Row, talk: Talk, here: Spot) -> None:
     since = now - memory["asked_s"]
     if since < talk.ask_s or memory["way_n"] == 0 or not _may_send(see, memory):
         return
-    anybody, new_face = _who_is_there(see, memory, talk)
+    anybody, new_face = _who_is_there(see, memory)
     if not anybody:
         return
     first = _first_new(memory, here, talk.cell_m)
@@ -260,12 +260,11 @@ def ask(see: View, memory: Row, talk: Talk, here: Spot) -> None:
     start_round(see)
     shared["asked_all"] = 1
     head = Head(see.percept["id"], see.percept["boot"], shared["asked_seq"], 0)
-    place = own_place(see)
     for k in range(n):
-        memory["talk_at"][k, 0] -= place.x
-        memory["talk_at"][k, 1] -= place.y
+        memory["talk_at"][k, 0] -= shared["x"]
+        memory["talk_at"][k, 1] -= shared["y"]
     k = out["n_out"]
-    length = encode_check(head, place, memory["talk_at"], n, out["out"][k])
+    length = encode_check(head, own_place(see, memory), memory["talk_at"], n, out["out"][k])
     if length > 0:
         out["out_to"][k], out["out_length"][k], out["n_out"] = EVERYBODY, length, k + 1
         memory["budget"] -= length
@@ -275,17 +274,14 @@ def ask(see: View, memory: Row, talk: Talk, here: Spot) -> None:
 
 
 @jit_inner
-def _who_is_there(see: View, memory: Row, talk: Talk) -> tuple[bool, bool]:
+def _who_is_there(see: View, memory: Row) -> tuple[bool, bool]:
     """Return whether somebody may hear and understand us, and whether somebody is in sight that was not asked yet."""
-    shared, anybody, new_face = see.shared, False, False
+    shared, anybody, new_face = see.shared, memory["frame_n"] > 0, False
     for t in range(PEERS):
         if shared["track_id"][t] >= 0:
             anybody = True
             k = slot_of(memory, shared["track_id"][t])
             new_face = new_face or (k >= 0 and memory["met_asked_s"][k] < 0.0)
-    for k in range(memory["met_id"].size):
-        near = memory["gone"] - memory["met_gone"][k] <= talk.trust_m / talk.cell_m
-        anybody = anybody or (memory["met_n"][k] > 0 and near)
     return anybody, new_face
 
 
@@ -293,7 +289,7 @@ def _who_is_there(see: View, memory: Row, talk: Talk) -> tuple[bool, bool]:
 def _corners_ahead(memory: Row, here: Spot, cell_m: float) -> int:
     """Return how many corners of the way are asked about."""
     at, far, n = here, 0.0, 0
-    while n < min(memory["way_n"], MAX_CORNERS) and far < AHEAD_M / cell_m:
+    while n < min(memory["way_n"], WAY_CORNERS) and far < AHEAD_M / cell_m:
         to = Spot(memory["way_u"][n], memory["way_v"][n])
         far += math.sqrt((to.u - at.u) ** 2 + (to.v - at.v) ** 2)
         at = to
@@ -345,6 +341,6 @@ def _write_way(memory: Row, here: Spot, first: int, cell_m: float) -> int:
             n += 1
         far += length
         at = to
-        if n == MAX_CORNERS or far >= most:
+        if n == WAY_CORNERS or far >= most:
             break
     return n

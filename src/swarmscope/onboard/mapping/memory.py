@@ -126,15 +126,15 @@ MAP = np.dtype(
         ("wrong_id", np.int32, WRONGED),  # who told something wrong, the newest over the oldest
         ("wrong_s", np.float64, WRONGED),  # and when that was seen
         ("wrong_at", np.uint8),
-        # where the frames of others lie (``mapping/met.py``)
-        ("met_n", np.uint8, MET),  # how often it has said where it is while it was in sight, 0 = nobody is noted
+        # the frame that is shared with others (``mapping/frames.py``)
+        ("frame", np.uint32),  # its name, 0: not yet begun
+        ("frame_n", np.uint8),  # how often somebody in sight has agreed
+        ("frame_x", np.float64),  # where the origin of the own one is in it [m]
+        ("frame_y", np.float64),
+        ("frame_gone", np.float32),  # how far we had gone when somebody last agreed [cells]
+        # who has been heard lately (``mapping/met.py``)
         ("met_id", np.int32, MET),
-        ("met_boot", np.int32, MET),
-        ("met_x", np.float32, MET),  # where it was in its own frame [m]
-        ("met_y", np.float32, MET),
-        ("met_u", np.float32, MET),  # and in ours [cells]
-        ("met_v", np.float32, MET),
-        ("met_gone", np.float32, MET),  # how far we had gone then [cells]
+        ("met_s", np.float64, MET),  # when
         ("met_told_s", np.float64, MET),  # when it was last answered
         ("met_asked_s", np.float64, MET),  # when it was last asked in sight
         # the question that was last asked, and what may still be sent
@@ -153,10 +153,10 @@ MAP = np.dtype(
 )
 
 
-OF_SHARING = ("heard", "answer", "wrong", "met_", "asked", "budget", "told", "changed", "talk_")
+OF_SHARING = ("heard", "answer", "wrong", "frame", "met_", "asked", "budget", "told", "changed", "talk_")
 """What the fields begin with that are for asking others."""
 NEVER = (
-    *("wrong_s", "asked_s", "met_told_s", "met_asked_s"),
+    *("wrong_s", "asked_s", "met_s", "met_told_s", "met_asked_s"),
     *("comes_s", "gives_s", "gave_s", "searched_s", "held_s", "leave_s"),
 )
 """Times of what has not happened yet."""

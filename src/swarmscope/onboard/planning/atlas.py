@@ -143,7 +143,7 @@ class Params(NamedTuple):
     believe_s: Seconds = 180.0
     """So long others are believed."""
     trust_m: Metres = 20.0
-    """A robot that has gone so far since it saw another one does not know any more where that one is."""
+    """A robot that has gone so far without seeing another one does not know any more where the shared frame lies."""
     cautious: Flag = 1
     """1: a near cell is cleared when all beams across it pass, several times; 0: as soon as one does. For studies."""
 

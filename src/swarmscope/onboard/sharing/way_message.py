@@ -1,7 +1,7 @@
 """The packets of robots that remember: "this is my way, who knows it is closed?" (CHECK), and what closes it (CLOSED).
 
-Byte by byte in docs/message.md. Places are in the sender's own frame, that of its odometry and compass; where that
-frame lies the receiver finds out for itself. The kernels never raise and never allocate.
+Byte by byte in docs/message.md. Places are in a frame that has a name; where it lies the receiver has to know. The
+kernels never raise and never allocate.
 """
 
 from __future__ import annotations
@@ -29,6 +29,12 @@ PLACE_M = 1.0 / 64.0
 CORNER_M = 1.0 / 8.0
 CELL_M = 1.0 / 16.0
 """Side of the cells of a CLOSED."""
+_NAME = 3
+"""Bytes of a frame's name."""
+FRAMES = 1 << 24
+"""Names of frames."""
+WAY_CORNERS = MAX_CORNERS - 1
+"""Corners of the way in a CHECK; one has the frame's name."""
 _CORNER_MOST = 2047
 _NEAR = 7
 """Steps from cell to cell that one byte holds along either axis."""
@@ -40,10 +46,11 @@ _AGAIN_MOST = 15
 
 
 class Place(NamedTuple):
-    """Where a robot is in its own frame [m]."""
+    """Where a robot is [m], and the name of the frame in which it is there."""
 
     x: float
     y: float
+    frame: int
 
 
 @jit_inline
@@ -66,9 +73,22 @@ def _cell_at(x: float) -> int:
 
 
 @jit_inline
-def read_place(data: np.ndarray, at: int) -> Place:
-    """Return where the sender was, modulo 1024 m."""
-    return Place(get_u16(data, at) * PLACE_M, get_u16(data, at + 2) * PLACE_M)
+def place_of(data: np.ndarray) -> Place:
+    """Return where the sender of a CHECK or a CLOSED that ``decode`` found ``OK`` was, modulo 1024 m.
+
+    The frame is 0, which no frame is called, where the packet names none.
+    """
+    is_check = int(data[0]) & 0xF == KIND_CHECK
+    at, body = (7, CHECK_HEAD) if is_check else (9, CLOSED_HEAD)
+    names = int(data[body - 1]) >= (1 if is_check else _NAME)
+    frame = int(data[body]) | int(data[body + 1]) << 8 | int(data[body + 2]) << 16 if names else 0
+    return Place(get_u16(data, at) * PLACE_M, get_u16(data, at + 2) * PLACE_M, frame)
+
+
+@jit_inline
+def _put_frame(out: np.ndarray, at: int, frame: int) -> None:
+    """Write the name of a frame into three bytes."""
+    out[at], out[at + 1], out[at + 2] = frame & 0xFF, (frame >> 8) & 0xFF, (frame >> 16) & 0xFF
 
 
 @jit_inline
@@ -82,18 +102,19 @@ def unwrapped(step: float) -> float:
 def encode_check(head: Head, place: Place, corners: np.ndarray, n: int, out: np.ndarray) -> int:
     """Write a CHECK into ``out`` uint8; return its length (0 when ``out`` is too small).
 
-    ``corners (n, 2)`` [m] of the way, relative to the sender, the first where it begins. Of more than ``MAX_CORNERS``
+    ``corners (n, 2)`` [m] of the way, relative to the sender, the first where it begins. Of more than ``WAY_CORNERS``
     the first are sent; one that is farther than 255 m along an axis is moved there.
     """
-    n = max(0, min(n, MAX_CORNERS, corners.shape[0]))
-    if out.size < CHECK_HEAD + 3 * n + 2:
+    n = max(0, min(n, WAY_CORNERS, corners.shape[0]))
+    if out.size < CHECK_HEAD + _NAME + 3 * n + 2:
         return 0
     put_head(out, KIND_CHECK, head)
     _put_place(out, 7, place)
-    out[CHECK_HEAD - 1] = n
+    out[CHECK_HEAD - 1] = n + 1
+    _put_frame(out, CHECK_HEAD, place.frame)
     for k in range(n):
-        _put_pair(out, CHECK_HEAD + 3 * k, _corner_code(corners[k, 0]), _corner_code(corners[k, 1]))
-    return put_checksum(out, CHECK_HEAD + 3 * n)
+        _put_pair(out, CHECK_HEAD + _NAME + 3 * k, _corner_code(corners[k, 0]), _corner_code(corners[k, 1]))
+    return put_checksum(out, CHECK_HEAD + _NAME + 3 * n)
 
 
 @jit_inline
@@ -121,13 +142,13 @@ def _corner_code(x: float) -> int:
 def read_check(data: np.ndarray, length: int, corners: np.ndarray) -> int:
     """Write the corners of a CHECK that ``decode`` found ``OK`` into ``corners (N, 2)`` [m]; return how many, -1: none.
 
-    They are relative to the sender, along the axes of its frame.
+    They are relative to the sender, along the axes of all frames.
     """
-    if length < CHECK_HEAD + 2 or length > data.size or int(data[0]) & 0xF != KIND_CHECK:
+    if length < CHECK_HEAD + _NAME + 2 or length > data.size or int(data[0]) & 0xF != KIND_CHECK:
         return -1
-    n = min(int(data[CHECK_HEAD - 1]), corners.shape[0], (length - CHECK_HEAD - 2) // 3)
+    n = max(0, min(int(data[CHECK_HEAD - 1]) - 1, corners.shape[0], (length - CHECK_HEAD - _NAME - 2) // 3))
     for k in range(n):
-        x, y = _pair(data, CHECK_HEAD + 3 * k)
+        x, y = _pair(data, CHECK_HEAD + _NAME + 3 * k)
         corners[k, 0], corners[k, 1] = x * CORNER_M, y * CORNER_M
     return int(n)
 
@@ -143,18 +164,19 @@ def _signed(value: int, bits: int) -> int:
 def encode_closed(head: Head, place: Place, cells: np.ndarray, n: int, out: np.ndarray, most: int) -> int:
     """Write a CLOSED of at most ``most`` bytes into ``out`` uint8; return its length, 0: nothing fits.
 
-    ``cells (n, 2)`` are numbers of cells of `CELL_M` of the sender's frame, none farther than 127 m from it along an
+    ``cells (n, 2)`` are numbers of cells of `CELL_M` of the place's frame, none farther than 127 m from it along an
     axis. Those that come first are sent; what is near the cell before takes one byte, else four; the same step again
     and again, up to 15 times, takes one more.
     """
     most = min(most, out.size)
     n = min(n, cells.shape[0])
-    at, x, y = CLOSED_HEAD, 0, 0
+    at, x, y = CLOSED_HEAD + _NAME, 0, 0
     ox, oy = _cell_at(place.x), _cell_at(place.y)
-    if n <= 0 or most < CLOSED_HEAD + 5:
+    if n <= 0 or most < CLOSED_HEAD + _NAME + 5:
         return 0
     put_answer_head(out, KIND_CLOSED, head)
     _put_place(out, 9, place)
+    _put_frame(out, CLOSED_HEAD, place.frame)
     dx, dy, again = 0, 0, 0
     for k in range(n):
         was_x, was_y, dx, dy = dx, dy, cells[k, 0] - x, cells[k, 1] - y
@@ -203,13 +225,13 @@ def read_closed(data: np.ndarray, length: int, cells: np.ndarray) -> int:
 
     Return how many, -1 for other packets.
 
-    They are relative to the sender, along the axes of its frame; what is torn ends the list.
+    They are relative to the sender, along the axes of all frames; what is torn ends the list.
     """
-    if length < CLOSED_HEAD + 2 or length > data.size or int(data[0]) & 0xF != KIND_CLOSED:
+    if length < CLOSED_HEAD + _NAME + 2 or length > data.size or int(data[0]) & 0xF != KIND_CLOSED:
         return -1
-    place = read_place(data, 9)
+    place = place_of(data)
     ox, oy = math.floor(place.x / CELL_M), math.floor(place.y / CELL_M)
-    at, end, n, x, y = CLOSED_HEAD, length - 2, 0, 0, 0
+    at, end, n, x, y = CLOSED_HEAD + _NAME, length - 2, 0, 0, 0
     dx, dy, times, anew = 0, 0, 1, True
     while at < end and n < cells.shape[0]:
         code = int(data[at])
