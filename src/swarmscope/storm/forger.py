@@ -24,7 +24,7 @@ from swarmscope.onboard.sharing.message import (
     is_request,
     name_of,
 )
-from swarmscope.onboard.sharing.way_message import CELL_M, FRAMES, Place, encode_check, encode_closed
+from swarmscope.onboard.sharing.way_message import FRAMES, Place, encode_check, encode_closed
 from swarmscope.sim.radio import throw_all
 from swarmscope.sim.state import Sim
 
@@ -200,13 +200,12 @@ def _walls(rng: np.random.Generator, head: Head, out: np.ndarray) -> int:
     """Write that a way is closed, by walls that wind about; return its length."""
     place = _place(rng)
     cells = np.zeros((MAX_PACKET_BYTES, 2), np.int64)
-    x, y = int(place.x / CELL_M), int(place.y / CELL_M)
     for k in range(cells.shape[0]):
         if k == 0 or rng.random() < 0.05:
             dx, dy = int(rng.integers(-90, 91)), int(rng.integers(-90, 91))
             step_x, step_y = int(rng.integers(-4, 5)), int(rng.integers(-4, 5))
         dx, dy = dx + step_x, dy + step_y
-        cells[k, 0], cells[k, 1] = x + dx, y + dy
+        cells[k, 0], cells[k, 1] = dx, dy
     return encode_closed(head, place, cells, cells.shape[0], out, MAX_PACKET_BYTES)
 
 

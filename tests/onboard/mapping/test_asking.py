@@ -166,15 +166,31 @@ def test_while_answers_come_late_those_to_others_are_left_too():
     assert pair.asker.memory["heard"] == 1
 
 
-def told_by(pair, cells, to=None, seq=1):
+def told_by(pair, cells, to=None, seq=1, sender=KNOWS):
     """A forged answer to the asker's present question, or another, in the name of the robot that it sees."""
     shared, percept = pair.asker.shared, pair.asker.percept
     out = np.zeros(MAX_PACKET_BYTES, np.uint8)
     to = name_of(int(percept["boot"]), int(shared["asked_seq"])) if to is None else to
-    head = Head(KNOWS, 0, int(pair.knows.shared["seq"]) + seq, to)
+    head = Head(sender, 0, int(pair.knows.shared["seq"]) + seq, to)
     place = own_place(pair.knows.view, pair.knows.memory)
-    cells = np.add(cells, (round(place.x / CELL_M), round(place.y / CELL_M))).astype(np.int32)
+    cells = np.array(cells, np.int32)
     return out[: encode_closed(head, place, cells, len(cells), out, MAX_PACKET_BYTES)].tobytes()
+
+
+def test_one_lie_in_a_name_that_was_never_seen_silences_all_such_names():
+    pair = Pair().go(15)
+    lie = [(-32, k) for k in range(-40, 41, 3)]
+    for name in (4001, 4002):
+        pair.asker.receive([told_by(pair, lie, to=4242, sender=name)])
+        tick(pair.asker)
+        pair.asker.receive([])
+        for _ in range(20):
+            tick(pair.asker)
+        assert pair.asker.memory["heard"] == 1
+        assert pair.asker.memory["answers_n"] == 0
+    pair.asker.receive([told_by(pair, lie, to=4242, sender=KNOWS)])
+    tick(pair.asker)
+    assert pair.asker.memory["heard"] == 2
 
 
 def test_a_forged_wall_where_the_robot_sees_that_there_is_none_is_not_believed_for_long():
@@ -224,14 +240,11 @@ def test_a_packet_never_closes_what_is_free(cells, x, y):
     n = trace(bot.view, memory, CELL_M, (cells[0][0] + 0.5, cells[0][1] + 0.5), (TALK, 96.0))
     assert n > 0
     out = np.zeros(MAX_PACKET_BYTES, np.uint8)
-    place = Place(x, y, 1)
-    ox, oy = math.floor(x / CELL_M), math.floor(y / CELL_M)
-    numbers = memory["talk_cell"][:n] + np.array([ox, oy], np.int32)
-    length = encode_closed(Head(1, 2, 3, 4), place, numbers, n, out, MAX_PACKET_BYTES)
+    numbers = memory["talk_cell"][:n].copy()
+    length = encode_closed(Head(1, 2, 3, 4), Place(x, y, 1), numbers, n, out, MAX_PACKET_BYTES)
     found = np.zeros((TALK, 2))
     n = read_closed(out, length, found)
-    shift = np.array([x / CELL_M - ox, y / CELL_M - oy])
-    assert hear(other, found / CELL_M + shift, n, 0.0, 1)
+    assert hear(other, found / CELL_M + 0.5, n, 0.0, 1)
     assert other["disc_r"][LEAST] < other["disc_r"][FULL] - 0.5
     ask_for(memory, FULL)
     for u, v in np.random.default_rng(0).uniform(-70.0, 70.0, (400, 2)):

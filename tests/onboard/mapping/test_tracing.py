@@ -15,7 +15,7 @@ from helpers import one_robot, rig_of
 from swarmscope.onboard.mapping.answering import closed_place
 from swarmscope.onboard.mapping.heard import hear, is_told_closed
 from swarmscope.onboard.mapping.memory import TALK
-from swarmscope.onboard.mapping.tracing import HALF, JOINED, apart, trace
+from swarmscope.onboard.mapping.tracing import JOINED, apart, trace
 from swarmscope.onboard.sharing.message import Head
 from swarmscope.onboard.sharing.way_message import CELL_M, Place, encode_closed, read_closed
 
@@ -133,14 +133,13 @@ def test_the_walls_of_a_room_fit_into_sixty_bytes(see):
     assert read_closed(out, length, np.zeros((TALK, 2), np.float32)) == n
 
 
-def test_the_square_holds_what_an_answer_can():
-    assert HALF >= TALK
-
-
-@pytest.mark.parametrize("radius", [1.2, 2.0, 3.2, 5.0])
-def test_nothing_fits_between_neighbours_in_a_straight_wall(radius):
-    memory = map_of(radius=radius)
-    step = math.ceil(apart(memory))
-    cells = np.array([(step * k + 0.5, 0.5) for k in range(9)])
-    assert hear(memory, cells, len(cells), 0.0, 3)
-    assert all(is_told_closed(memory, u, 0.5) for u in np.arange(0.5, 8 * step + 0.5, 0.1))
+@pytest.mark.parametrize("radius", [1.2, 1.7, 2.2, 3.2, 5.0])
+@pytest.mark.parametrize(("width", "height"), [(40, 49), (31, 22), (18, 37)])
+def test_nothing_gets_through_the_walls_of_a_room(see, radius, width, height):
+    room = [(ix, y) for ix in range(10, 10 + width) for y in (0, height)]
+    room += [(x, iy) for iy in range(height) for x in (10, 10 + width)]
+    memory, other = map_of(*room, radius=radius), map_of(radius=radius)
+    told = np.array(traced(see, memory, (10.5, 0.5)), np.float64) + 0.5
+    assert hear(other, told, len(told), 0.0, 3)
+    if len(told) < TALK:
+        assert all(is_told_closed(other, x + 0.5, y + 0.5) for x, y in room)

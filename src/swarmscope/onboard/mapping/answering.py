@@ -1,7 +1,7 @@
 """Whether the way of somebody who asks is closed by the own map, and by which cells for sure.
 
-The way is closed where the least disc fits neither on it nor, moved aside a little, close by. Told is what the robot
-has seen itself; of what it has left behind, the middles of the nodes that are shut.
+The way is closed where the least disc does not fit, and where, moved aside a little, it is barred close by. Told is
+what the robot has seen itself; of what it has left behind, the middles of the nodes that are shut.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class Leg(NamedTuple):
 
 @jit_inner
 def _is_walled(see: View, memory: Row, cell: float, at: Leg) -> bool:
-    """Tell whether nothing fits at a place of a way, nor anywhere along it there when it is moved aside a little."""
+    """Tell whether nothing fits at a place of a way, and it is barred close by when it is moved aside a little."""
     if fits(memory, at.u, at.v):
         return False
     for side in ASIDE:

@@ -14,13 +14,13 @@ from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.onboard.mapping.answering import closed_place
 from swarmscope.onboard.mapping.cells import LEAST
 from swarmscope.onboard.mapping.evidence import closes, is_passed
-from swarmscope.onboard.mapping.frames import agree, is_shared, keep_frame, own_place, shift_m, spot_of
+from swarmscope.onboard.mapping.frames import agree, is_shared, keep_frame, own_place, spot_of
 from swarmscope.onboard.mapping.heard import distrusts, hear, note_wrong, review_heard
 from swarmscope.onboard.mapping.memory import TALK
-from swarmscope.onboard.mapping.met import note_heard, slot_of
+from swarmscope.onboard.mapping.met import NOBODY, STRANGERS, note_heard, slot_of
 from swarmscope.onboard.mapping.news import keep_news
 from swarmscope.onboard.mapping.tracing import trace
-from swarmscope.onboard.mapping.words import Spot
+from swarmscope.onboard.mapping.words import Spot, number
 from swarmscope.onboard.percept import EVERYBODY, MAX_OUTBOX, NEVER_S, PEERS, Row
 from swarmscope.onboard.sharing.inbox import start_round
 from swarmscope.onboard.sharing.message import KIND_CHECK, OK, Head, decode, name_of
@@ -48,6 +48,8 @@ AHEAD_M = 40.0
 """So much of the way is asked about."""
 SMALL_M = 1.5
 """What is smaller along both axes is not told: the way round it is hardly longer."""
+SHARE = 0.25
+"""Of the time between two answers to one robot, that between two to robots that have never been in sight."""
 TRIES = 3
 """What does not fit into a packet is traced anew, with fewer cells, so often."""
 
@@ -104,25 +106,38 @@ def _doubt(see: View, memory: Row, cell_m: float) -> None:
         k += EVERY
 
 
+class Sender(NamedTuple):
+    """Who has sent a packet."""
+
+    slot: int
+    """Where it is noted (`met`), -1: it is not believed."""
+    known: bool
+    """Whether it is known where it is."""
+    at: Spot
+    """Where [cells]."""
+
+
 @jit_inner
-def _find(see: View, memory: Row, talk: Talk, place: Place) -> tuple[bool, Spot]:
-    """Return whether it is known where the sender of the packet in ``see.header`` is, and where [cells].
+def _sender(see: View, memory: Row, talk: Talk, place: Place) -> Sender:
+    """Return who has sent the packet in ``see.header``, which says that it is at ``place``.
 
     What it says of itself it said a tick ago. Who is in sight is understood in any frame.
     """
-    shared, sender, nowhere = see.shared, see.header[1], Spot(0.0, 0.0)
-    note_heard(memory, sender, see.percept["now_s"])
-    if place.frame == 0:
-        return False, nowhere
-    in_sight, x, y = False, 0.0, 0.0
+    shared, now, name, x, y = see.shared, see.percept["now_s"], STRANGERS, 0.0, 0.0
     for t in range(PEERS):
-        if shared["track_id"][t] == sender and shared["track_seen_s"][t] == see.percept["now_s"]:
-            in_sight, x, y = True, shared["x"] + shared["track_was_x"][t], shared["y"] + shared["track_was_y"][t]
-    if in_sight and not agree(memory, place, x, y):
-        return False, nowhere
+        if shared["track_id"][t] == see.header[1] and shared["track_seen_s"][t] == now:
+            x, y = shared["x"] + shared["track_was_x"][t], shared["y"] + shared["track_was_y"][t]
+            name = see.header[1]
+    in_sight = name != STRANGERS
+    if slot_of(memory, see.header[1]) >= 0:
+        name = see.header[1]
+    lies = place.frame == 0 or distrusts(memory, name, now, talk.keep_s)
+    if lies or (in_sight and not agree(memory, place, x, y)):
+        return Sender(NOBODY, False, Spot(0.0, 0.0))
+    at = Spot(x / talk.cell_m, y / talk.cell_m)
     if is_shared(memory, place):
-        return True, spot_of(see, memory, place, talk.cell_m)
-    return in_sight, Spot(x / talk.cell_m, y / talk.cell_m)
+        at = spot_of(see, memory, place, talk.cell_m)
+    return Sender(note_heard(memory, name, now), in_sight or is_shared(memory, place), at)
 
 
 @jit_inner
@@ -138,50 +153,51 @@ def _answer(see: View, memory: Row, talk: Talk, packet: int) -> None:
     """Tell the sender of a CHECK what closes its way, if that is known and there is room on the air."""
     now = see.percept["now_s"]
     data, length = see.percept["packet"][packet], see.percept["packet_length"][packet]
-    known, there = _find(see, memory, talk, place_of(data))
-    who = slot_of(memory, see.header[1])
-    if not known or not _may_send(see, memory) or now - memory["met_told_s"][who] < talk.ask_s:
+    sender = _sender(see, memory, talk, place_of(data))
+    if not sender.known or not _may_send(see, memory):
         return
+    pause = talk.ask_s * (SHARE if memory["met_id"][sender.slot] == STRANGERS else 1.0)
+    if now - memory["met_told_s"][sender.slot] < pause:
+        return
+    memory["met_told_s"][sender.slot] = now
     n = read_check(data, length, memory["talk_at"])
-    _from_there(memory, there, n, talk.cell_m)
+    _from_there(memory, sender.at, n, talk.cell_m)
     reach = talk.reach_m / talk.cell_m
     closed, u, v = closed_place(see, memory, talk.cell_m, memory["talk_at"], (n, reach))
-    if not closed:
-        return
-    if _tell(see, memory, talk, (u, v), name_of(see.header[5], see.header[2])):
-        memory["met_told_s"][who] = now
+    if closed:
+        _tell(see, memory, talk, (u, v))
 
 
 @jit_inner
-def _tell(see: View, memory: Row, talk: Talk, place: tuple[float, float], reply_to: int) -> bool:
-    """Tell everybody what closes a place [cells]; return whether there was something to tell."""
-    out = see.out
-    length = _write_closed(see, memory, talk, place, reply_to)
+def _tell(see: View, memory: Row, talk: Talk, place: tuple[float, float]) -> None:
+    """Answer the question in ``see.header`` with what closes a place [cells], to be heard by everybody."""
+    out, shared = see.out, see.shared
+    seq = (shared["seq"] + 1) & 0xFFFF
+    head = Head(see.percept["id"], see.percept["boot"], seq, name_of(see.header[5], see.header[2]))
+    length = _write_closed(see, memory, talk, place, head)
     if length == 0:
-        return False
+        return
     k = out["n_out"]
     out["out_to"][k], out["out_length"][k], out["n_out"] = EVERYBODY, length, k + 1
+    shared["seq"] = seq
     memory["budget"] -= length
     memory["told"] += 1
-    return True
 
 
 @jit_inner
-def _write_closed(see: View, memory: Row, talk: Talk, place: tuple[float, float], reply_to: int) -> int:
-    """Write what closes a place [cells] into the outbox, in answer to question ``reply_to``.
+def _write_closed(see: View, memory: Row, talk: Talk, place: tuple[float, float], head: Head) -> int:
+    """Write what closes a place [cells] into the outbox.
 
     Return its length, 0: there is none, or it is small. What is nearest to the place is told, as much of it as fits.
     """
-    shared, data = see.shared, see.out["out"][see.out["n_out"]]
-    shared["seq"] = (shared["seq"] + 1) & 0xFFFF
-    head = Head(see.percept["id"], see.percept["boot"], shared["seq"], reply_to)
+    data = see.out["out"][see.out["n_out"]]
     most, length = min(TALK, talk.cells), 0
     for _ in range(TRIES):
         n = trace(see, memory, talk.cell_m, place, (most, talk.reach_m / talk.cell_m))
-        if _is_small(memory, n, SMALL_M / talk.cell_m):
+        if n == 0 or (n < most and _is_small(memory, n, SMALL_M / talk.cell_m)):
             return 0
-        _to_lattice(memory, n, talk.cell_m)
-        length = encode_closed(head, own_place(see, memory), memory["talk_cell"], n, data, talk.payload)
+        here = _from_here(see, memory, n, talk.cell_m)
+        length = encode_closed(head, here, memory["talk_cell"], n, data, talk.payload)
         most = read_closed(data, length, memory["talk_at"])
         if most >= n:
             break
@@ -201,25 +217,30 @@ def _is_small(memory: Row, n: int, small: float) -> bool:
 
 
 @jit_inner
-def _to_lattice(memory: Row, n: int, cell_m: float) -> None:
-    """Turn numbers of cells of the map into those of the shared frame, which packets have."""
+def _from_here(see: View, memory: Row, n: int, cell_m: float) -> Place:
+    """Turn numbers of cells of the map into those of a packet's, which begin with the one in which the robot is.
+
+    Return the middle of that one in the shared frame: so cells stay the same cells, wherever the frames' origins are.
+    """
+    ix, iy = math.floor(see.shared["x"] / cell_m), math.floor(see.shared["y"] / cell_m)
     for k in range(n):
-        for axis in range(2):
-            at = (memory["talk_cell"][k, axis] + 0.5) * cell_m + shift_m(memory, axis)
-            memory["talk_cell"][k, axis] = int(math.floor(at / CELL_M))
+        memory["talk_cell"][k, 0] = math.floor((memory["talk_cell"][k, 0] - ix) * cell_m / CELL_M + 0.5)
+        memory["talk_cell"][k, 1] = math.floor((memory["talk_cell"][k, 1] - iy) * cell_m / CELL_M + 0.5)
+    x, y = (ix + 0.5) * cell_m + memory["frame_x"], (iy + 0.5) * cell_m + memory["frame_y"]
+    return Place(x, y, number(memory["frame"]))
 
 
 @jit_inner
 def _take_in(see: View, memory: Row, talk: Talk, packet: int) -> None:
     """Take in what closes the way by another robot's map."""
     data, length = see.percept["packet"][packet], see.percept["packet_length"][packet]
-    known, there = _find(see, memory, talk, place_of(data))
-    if not known or distrusts(memory, see.header[1], see.percept["now_s"], talk.keep_s):
+    sender = _sender(see, memory, talk, place_of(data))
+    if not sender.known:
         return
     n = read_closed(data, length, memory["talk_at"])
-    _from_there(memory, there, n, talk.cell_m)
+    _from_there(memory, sender.at, n, talk.cell_m)
     n = keep_news(memory, memory["talk_at"], n)
-    if not hear(memory, memory["talk_at"], n, see.percept["now_s"], see.header[1]):
+    if not hear(memory, memory["talk_at"], n, see.percept["now_s"], memory["met_id"][sender.slot]):
         return
     memory["heard"] += 1
     here = Spot(see.shared["x"] / talk.cell_m, see.shared["y"] / talk.cell_m)
@@ -289,7 +310,7 @@ def _who_is_there(see: View, memory: Row) -> tuple[bool, bool]:
 def _corners_ahead(memory: Row, here: Spot, cell_m: float) -> int:
     """Return how many corners of the way are asked about."""
     at, far, n = here, 0.0, 0
-    while n < min(memory["way_n"], WAY_CORNERS) and far < AHEAD_M / cell_m:
+    while n < min(memory["way_n"], WAY_CORNERS - 1) and far < AHEAD_M / cell_m:
         to = Spot(memory["way_u"][n], memory["way_v"][n])
         far += math.sqrt((to.u - at.u) ** 2 + (to.v - at.v) ** 2)
         at = to

@@ -3,8 +3,8 @@
 Frames are those of odometry, turned as compasses say, so they differ by a shift. Each robot begins in its own, named
 after itself and its boot number. Who sees the sender of a packet knows by what their frames differ, and takes over the
 one with the lower name; so a swarm comes to share one, and who is behind a wall is understood, too. Frames drift: two
-in sight that share one each move a little towards what the other says, and who has gone far without having seen anybody
-begins anew.
+in sight that share one each move a little towards what the other says. Who has gone far without agreement with anybody
+begins anew; not so the robot whose frame it is, for in that nothing else is lost.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import math
 from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.onboard.mapping.words import Spot, number
 from swarmscope.onboard.percept import Row
-from swarmscope.onboard.sharing.way_message import CELL_M, FRAMES, Place, unwrapped
+from swarmscope.onboard.sharing.way_message import FRAMES, Place, unwrapped
 from swarmscope.onboard.view import View
 
 FAR_OFF_M = 1.5
@@ -25,7 +25,10 @@ USUAL = 8
 
 @jit_inline
 def frame_name(address: int, boot: int) -> int:
-    """Return the name of a robot's own frame; not 0."""
+    """Return the name of a robot's own frame; not 0. Addresses below 255 with any boot numbers have names of their own.
+
+    Where two have one, they come to agree like others (`agree`).
+    """
     return max(1, ((boot << 8) ^ (address + 1)) & (FRAMES - 1))
 
 
@@ -48,29 +51,30 @@ def _take_over(memory: Row, name: int, x: float, y: float) -> None:
 
 
 @jit_inline
-def shift_m(memory: Row, axis: int) -> float:
-    """Return where the origin of the own frame is in the shared one [m]; in whole cells, so that cells stay cells."""
-    shift = float(memory["frame_x"] if axis == 0 else memory["frame_y"])
-    return CELL_M * math.floor(shift / CELL_M + 0.5)
-
-
-@jit_inline
 def own_place(see: View, memory: Row) -> Place:
     """Return where the robot is in the shared frame."""
-    return Place(
-        see.shared["x"] + shift_m(memory, 0), see.shared["y"] + shift_m(memory, 1), number(memory["frame"])
-    )  # fmt: skip
+    x, y = see.shared["x"] + memory["frame_x"], see.shared["y"] + memory["frame_y"]
+    return Place(x, y, number(memory["frame"]))
 
 
 @jit
 def agree(memory: Row, theirs: Place, x: float, y: float) -> bool:
-    """Note where a robot says it is that is seen at (x, y) [m] of the own frame; return whether that may be so."""
+    """Note where a robot says it is that is seen at (x, y) [m] of the own frame; return whether that may be so.
+
+    Who says again and again that it is elsewhere is right in the end: otherwise two that have slipped apart would never
+    understand each other again.
+    """
     name = number(memory["frame"])
+    if not abs(x) + abs(y) < math.inf:
+        return False
     if theirs.frame < name:
         _take_over(memory, theirs.frame, theirs.x - x, theirs.y - y)
     elif theirs.frame == name:
         off_x, off_y = unwrapped(theirs.x - x - memory["frame_x"]), unwrapped(theirs.y - y - memory["frame_y"])
-        if off_x * off_x + off_y * off_y > FAR_OFF_M * FAR_OFF_M:
+        if not off_x * off_x + off_y * off_y <= FAR_OFF_M * FAR_OFF_M:
+            memory["frame_n"] //= 2
+            if memory["frame_n"] == 0:
+                _take_over(memory, name, theirs.x - x, theirs.y - y)
             return False
         n = min(USUAL, memory["frame_n"] + 1)
         memory["frame_n"], memory["frame_gone"] = n, memory["gone"]

@@ -1,13 +1,18 @@
-"""Whom a robot has heard lately: when it answered them last, and whether it has asked them in sight."""
+"""Whom a robot has heard in sight: when it answered them last, and whether it has asked them.
+
+Who has never been in sight may be nobody: all those count as one, `STRANGERS`, with what they are answered and with
+what they told that was wrong.
+"""
 
 from __future__ import annotations
 
 from swarmscope._jit import jit
 from swarmscope.onboard.percept import NEVER_S, Row
 
-MET = 12
+MET = 16
 """Robots that are noted at once."""
 NOBODY = -1
+STRANGERS = -2
 
 
 @jit

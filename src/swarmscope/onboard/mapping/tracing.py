@@ -1,8 +1,8 @@
 """What stands round a closed place, thinned out and put into rows: much of a wall in few bytes.
 
-From what closes the place it goes on along the wall, both ways, as far as the answer holds: who knows only where a way
-ends tries the place beside it next. Told cells are so near to one another that nothing fits between two neighbours, and
-go straight on where they can: a packet holds a step that is repeated in one byte (`way_message`).
+From what closes the place it goes on along the wall, both ways, as far as the answer holds and not farther than 8 m:
+who knows only where a way ends tries the place beside it next. Everything told of is so near to a told cell that
+nothing fits through, and told cells go straight on where they can: a packet holds a step that is repeated in a byte.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class Start(NamedTuple):
 
 @jit
 def trace(see: View, memory: Row, cell: float, place: tuple[float, float], terms: tuple[int, float]) -> int:
-    """Write what closes a place, from the near to the far, in rows, into ``memory["talk_cell"]``; return how many.
+    """Write what closes a place, the nearest of it, in rows, into ``memory["talk_cell"]``; return how many cells.
 
     ``terms``: how many at most, and how far [cells] from the robot along an axis.
     """
@@ -55,8 +55,11 @@ def trace(see: View, memory: Row, cell: float, place: tuple[float, float], terms
 
 @jit_inline
 def apart(memory: Row) -> float:
-    """Return how far told cells are from one another at least [cells]: nothing fits between two neighbours."""
-    return float(min(JOINED, max(1.0, 2.0 * memory["disc_r"][LEAST] - 2.0)))
+    """Return how far told cells are from one another at least [cells]; everything told of is nearer to one than that.
+
+    It is what told cells keep free: so nothing fits through what is told of.
+    """
+    return float(min(JOINED, max(1.0, memory["disc_r"][LEAST])))
 
 
 @jit_inner

@@ -67,12 +67,6 @@ def _steps(x: float) -> int:
 
 
 @jit_inline
-def _cell_at(x: float) -> int:
-    """Return the cell in which a place along an axis [m] lies once it has been written."""
-    return math.floor(math.floor(x / PLACE_M + 0.5) * PLACE_M / CELL_M) if abs(x) < 1e9 else 0
-
-
-@jit_inline
 def place_of(data: np.ndarray) -> Place:
     """Return where the sender of a CHECK or a CLOSED that ``decode`` found ``OK`` was, modulo 1024 m.
 
@@ -164,14 +158,13 @@ def _signed(value: int, bits: int) -> int:
 def encode_closed(head: Head, place: Place, cells: np.ndarray, n: int, out: np.ndarray, most: int) -> int:
     """Write a CLOSED of at most ``most`` bytes into ``out`` uint8; return its length, 0: nothing fits.
 
-    ``cells (n, 2)`` are numbers of cells of `CELL_M` of the place's frame, none farther than 127 m from it along an
-    axis. Those that come first are sent; what is near the cell before takes one byte, else four; the same step again
-    and again, up to 15 times, takes one more.
+    ``cells (n, 2)`` are numbers of cells of `CELL_M`, of that in whose middle ``place`` is: none is farther than 127 m
+    along an axis. Those that come first are sent; what is near the cell before takes one byte, else four; the same step
+    again and again, up to 15 times, takes one more.
     """
     most = min(most, out.size)
     n = min(n, cells.shape[0])
     at, x, y = CLOSED_HEAD + _NAME, 0, 0
-    ox, oy = _cell_at(place.x), _cell_at(place.y)
     if n <= 0 or most < CLOSED_HEAD + _NAME + 5:
         return 0
     put_answer_head(out, KIND_CLOSED, head)
@@ -200,7 +193,7 @@ def encode_closed(head: Head, place: Place, cells: np.ndarray, n: int, out: np.n
             if k > 0:
                 out[at] = _LEAP
                 at += 1
-            _put_pair(out, at, (cells[k, 0] - ox) & 0xFFF, (cells[k, 1] - oy) & 0xFFF)
+            _put_pair(out, at, cells[k, 0] & 0xFFF, cells[k, 1] & 0xFFF)
             at += 3
         x, y = cells[k, 0], cells[k, 1]
     out[CLOSED_HEAD - 1] = at - CLOSED_HEAD
@@ -229,8 +222,6 @@ def read_closed(data: np.ndarray, length: int, cells: np.ndarray) -> int:
     """
     if length < CLOSED_HEAD + _NAME + 2 or length > data.size or int(data[0]) & 0xF != KIND_CLOSED:
         return -1
-    place = place_of(data)
-    ox, oy = math.floor(place.x / CELL_M), math.floor(place.y / CELL_M)
     at, end, n, x, y = CLOSED_HEAD + _NAME, length - 2, 0, 0, 0
     dx, dy, times, anew = 0, 0, 1, True
     while at < end and n < cells.shape[0]:
@@ -242,7 +233,7 @@ def read_closed(data: np.ndarray, length: int, cells: np.ndarray) -> int:
             x, y = _pair(data, at)
             dx, dy, times = 0, 0, 0
             at += 3
-            n = _note_cell(cells, n, (ox + x, oy + y), place)
+            n = _note_cell(cells, n, x, y)
         elif code & 0xF == _AGAIN:
             times = _times(code >> 4)
             at += 1
@@ -252,13 +243,12 @@ def read_closed(data: np.ndarray, length: int, cells: np.ndarray) -> int:
         anew = False
         for _ in range(min(times, cells.shape[0] - n)):
             x, y = x + dx, y + dy
-            n = _note_cell(cells, n, (ox + x, oy + y), place)
+            n = _note_cell(cells, n, x, y)
     return n
 
 
 @jit_inline
-def _note_cell(cells: np.ndarray, n: int, cell: tuple[int, int], place: Place) -> int:
-    """Write the middle of a cell, relative to the sender, as the ``n``-th; return how many there are."""
-    cells[n, 0] = (cell[0] + 0.5) * CELL_M - place.x
-    cells[n, 1] = (cell[1] + 0.5) * CELL_M - place.y
+def _note_cell(cells: np.ndarray, n: int, x: int, y: int) -> int:
+    """Write the middle of a cell as the ``n``-th; return how many there are."""
+    cells[n, 0], cells[n, 1] = x * CELL_M, y * CELL_M
     return n + 1
