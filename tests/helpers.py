@@ -31,9 +31,10 @@ def make_sensor(beams=360, fov=2.0 * math.pi, range_max=5.0, range_min=0.0, **er
 def rig_of(body=None, sensor=None, **options):
     """A robot's constants; ``options`` are fields of ``Guarding``, ``Safety`` and ``Sharing``.
 
-    Margins are those of the top speed unless they say otherwise: tests put robots into a scene that stand there.
+    Margins are those of the top speed, and no scan is waited for, unless they say otherwise: tests put robots into a
+    scene that stand there.
     """
-    options = {"speed_step_mps": 0.0} | options
+    options = {"speed_step_mps": 0.0, "first_scans": 0} | options
     groups = []
     for kind in (Guarding, Safety, Sharing):
         groups.append(kind(**{name: options.pop(name) for name in kind._fields if name in options}))

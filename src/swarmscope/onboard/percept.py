@@ -143,7 +143,7 @@ SHARED = np.dtype(
         # counters
         ("dropped_bad", np.int64),  # torn, corrupt or foreign packets
         ("dropped_stale", np.int64),  # old, replayed or unasked-for packets
-        ("started", np.uint8),
+        ("started", np.uint8),  # ticks so far, as far as they are counted
         ("clock_s", np.float64),  # what the clock said at the last tick
         ("base_s", np.float64),  # its own time (``perception/clock.py``): so much, ...
         ("even_n", np.int64),  # ... and since then so many ticks on time, ...

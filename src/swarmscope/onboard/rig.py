@@ -56,6 +56,9 @@ class Guarding(NamedTuple):
     """How fast those are that are no robots and do not yield, people; 0 and below: there are none."""
     strangers_m: float = -1.0
     """Radius of the smallest of them; 0 and below: `STRANGERS_M`."""
+    first_scans: int = -1
+    """A robot takes so many scans, and turns a little from one to the next, before it sets off; below 0: one. Three for
+    a LiDAR that loses readings, or has beams that never see anything."""
     enabled: bool = True
     """Whether there is a guard at all: simulated robots of a study may go without."""
 
@@ -217,13 +220,15 @@ def _resolved(guarding: Guarding, body: Body) -> Guarding:
     """Return plain numbers, what is not said of others filled in."""
     own = {"others_mps": body.v_max_mps, "others_smallest_m": body.radius_m, "others_largest_m": body.radius_m}
     own |= {"strangers_mps": 0.0, "strangers_m": STRANGERS_M}
-    switches = ("others_yield", "enabled")
+    scans = guarding.first_scans if guarding.first_scans >= 0 else 1
+    switches = ("others_yield", "enabled", "first_scans")
     given = {name: float(value) for name, value in guarding._asdict().items() if name not in switches}
     unsaid = [name for name in own if not (given[name] > 0.0 or (given[name] == 0.0 and name.endswith("_mps")))]
     filled = given | {name: own[name] for name in unsaid}
     filled["others_smallest_m"] = min(filled["others_smallest_m"], body.radius_m)
     filled["others_largest_m"] = max(filled["others_largest_m"], filled["others_smallest_m"])
-    return Guarding(**filled, others_yield=bool(guarding.others_yield), enabled=bool(guarding.enabled))
+    yields, enabled = bool(guarding.others_yield), bool(guarding.enabled)
+    return Guarding(**filled, others_yield=yields, enabled=enabled, first_scans=int(scans))
 
 
 def keeps_beside(body: Body, sensor: Sensor) -> float:

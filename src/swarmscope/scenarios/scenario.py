@@ -233,6 +233,9 @@ class GuardModel(_Strict):
     as fast as the fastest disc that moves in this world, 0: there are none [m/s]."""
     strangers_m: Annotated[float, Field(ge=-1.0, le=1000.0), NUMBER] = GUARDING.strangers_m
     """Radius of the smallest of them; 0 and below: of the smallest disc that moves here, 0.2 m without one [m]."""
+    first_scans: Annotated[int, Field(ge=-1, le=100), NUMBER] = GUARDING.first_scans
+    """A robot takes so many scans, and turns a little between them, before it sets off; below 0: three where
+    ``noise.dropout`` or ``noise.stuck`` is above 0, else one."""
 
 
 def _switched(value: Any) -> Any:

@@ -26,6 +26,8 @@ from swarmscope.tasks import Setup, load_task
 from swarmscope.tasks._contract import all_options
 from swarmscope.user_files import is_file_name, whole_path
 
+FIRST_SCANS = 3
+"""What one beam sees may be lost in one scan or in two, while the beam that looks there later is stuck."""
 MOST_PLACES = 50_000_000
 """Of things that move, over a run: 0.8 GB."""
 
@@ -97,7 +99,7 @@ def sheet_of(
     return (
         body_of(sheet or scenario.widest),
         Guarding(
-            **guard.model_dump(exclude_none=True) | _about_others(scenario, moving),
+            **guard.model_dump(exclude_none=True) | _about_others(scenario, moving) | _first_scans(scenario),
             latency_s=noise.scan_age_s,
             odometry_scale=noise.odometry_scale,
             odometry_drift_m=noise.odometry_drift_m,
@@ -110,6 +112,12 @@ def sheet_of(
             printed_filter=scenario.features.filter == "printed",
         ),
     )
+
+
+def _first_scans(scenario: Scenario) -> dict[str, int]:
+    """Return how many scans it takes to set off where beams lose what they see, and nobody has said otherwise."""
+    loses = scenario.noise.dropout > 0.0 or scenario.noise.stuck > 0.0
+    return {"first_scans": FIRST_SCANS} if loses and scenario.guard.first_scans < 0 else {}
 
 
 def _mask_of(scenario: Scenario) -> int:

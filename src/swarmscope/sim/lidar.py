@@ -87,16 +87,16 @@ def cast_segment(ax: float, ay: float, bx: float, by: float, beams: Beams, out: 
 def _disc_run(cx: float, cy: float, radius: float, beams: Beams, first: int, stop: int, out: Ranges) -> None:
     """Intersect beams first .. stop - 1 with a disc; from inside it, the exit counts."""
     radius2 = radius * radius
-    for n in range(first, stop):
-        dx, dy = beams.cos[n], beams.sin[n]
+    cosines, sines, ranges = beams.cos[first:stop], beams.sin[first:stop], out[first:stop]
+    for n in range(ranges.size):  # without branches: several beams at a time
+        dx, dy = cosines[n], sines[n]
         across = cx * dy - cy * dx
         under = radius2 - across * across
-        if under >= 0.0:
-            along = cx * dx + cy * dy
-            half = math.sqrt(under)
-            distance = along - half if along >= half else along + half
-            if 0.0 <= distance <= beams.range_max and distance < out[n]:
-                out[n] = distance
+        along = cx * dx + cy * dy
+        half = math.sqrt(max(0.0, under))
+        distance = along - half if along >= half else along + half
+        nearer = (under >= 0.0) & (distance >= 0.0) & (distance <= beams.range_max) & (distance < ranges[n])
+        ranges[n] = distance if nearer else ranges[n]
 
 
 @jit_inline

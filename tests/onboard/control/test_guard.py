@@ -298,3 +298,17 @@ def test_a_robot_that_starts_within_its_clearance_gets_away_and_never_touches():
     for run in range(20):
         sim, swarm = place_sim([(0.0, 0.0, -0.5 * math.pi)], world=world, rig=rig, seed=run)
         assert closest(sim, swarm, 30, 2) > 0.0
+
+
+def test_who_was_just_switched_on_looks_three_times_before_it_sets_off():
+    """Turning, so that other beams look where a stuck one did; somebody who drives brakes straight on."""
+    rows = one_robot(rig_of(first_scans=3))
+    driven = []
+    for _ in range(4):
+        update_odometry(rows.percept, rows.shared)
+        driven.append(guarded(np.inf, 0.0, 0.5, 0.0, rows=rows))
+    five = 5.0 * rows.rig.sensor.increment / DT
+    assert [(v, pytest.approx(w)) for v, w, _ in driven[:2]] == [(0.0, pytest.approx(five))] * 2
+    assert [(v, w) for v, w, _ in driven[2:]] == [(0.5, 0.0)] * 2
+    rows = one_robot(rig_of(first_scans=3))
+    assert guarded(np.inf, 0.3, 0.5, 1.0, rows=rows)[:2] == (0.0, 0.0)

@@ -19,7 +19,7 @@ from swarmscope.onboard.control.corners import apart_round, matters_up_to, other
 from swarmscope.onboard.control.halves import Others, leaves_room, met_by
 from swarmscope.onboard.control.horizon import horizon_speed
 from swarmscope.onboard.control.strangers import held_by_strangers
-from swarmscope.onboard.control.unseen import look_round, out_of_sight, reaches_between
+from swarmscope.onboard.control.unseen import look_first, look_round, out_of_sight, reaches_between
 from swarmscope.onboard.control.way import STEPS, Way, closer, shadowed, way_of
 from swarmscope.onboard.percept import MAX_NEIGHBOURS, PEERS, Row
 from swarmscope.onboard.perception.frames import is_blurred
@@ -71,6 +71,9 @@ def guard(see: View) -> bool:
     if not rig.guarding.enabled:
         out["v"], out["w"] = asked, w
         return False
+    if see.shared["started"] < rig.guarding.first_scans:
+        out["v"], out["w"], out["reason"] = 0.0, look_first(see, w), R_HELD_UNSEEN
+        return True
     v, w, why = _allowed(see, asked, w)
     if why == R_HELD_HOLE and max(v, percept["speed"]) <= HARDLY * asked:
         v, w = 0.0, w if percept["speed"] <= STANDS_MPS else 0.0

@@ -15,6 +15,8 @@ LOOK_SHARE = 0.4
 """Of what it sees of its field of view, by which a robot that looks round turns in a tick."""
 ASIDE_RAD = 0.2
 """By so much a robot that sees all round turns in a tick to look where a hole of its scan is."""
+FIRST_BEAMS = 5.0
+"""By so many beams a robot turns between its first scans: where one is stuck, those beside it may be, too."""
 AGAIN_S, WARY_S = 2.0, 10.0
 """A hole that holds a robot again within so long is shown to its planner as a thing, for so long."""
 FRONT_RAD = 1.8
@@ -73,6 +75,18 @@ def look_round(see: View, v: float, w: float, why: int) -> tuple[float, float, i
     seen = see.rig.sensor.increment * (shared["view_last"] - shared["view_first"] + 1)  # less while late scans turn
     turn = min(see.rig.body.w_max_radps, (LOOK_SHARE * seen if field > 0.0 else ASIDE_RAD) / see.percept["dt_s"])
     return 0.0, turn if shared["unseen_left"] else -turn, R_HELD_UNSEEN if field > 0.0 else R_HELD_HOLE
+
+
+@jit_inline
+def look_first(see: View, w: float) -> float:
+    """Return the turn rate of a robot that was just switched on: other beams are to look where a stuck one has looked.
+
+    As its planner has it, or by `FIRST_BEAMS` in a tick if that is more; straight on where it is not at rest.
+    """
+    if see.percept["speed"] > 0.0:
+        return 0.0
+    least: float = min(see.rig.body.w_max_radps, FIRST_BEAMS * see.rig.sensor.increment / see.percept["dt_s"])
+    return max(w, least) if w >= 0.0 else min(w, -least)
 
 
 @jit_inner

@@ -28,12 +28,12 @@ def leave_out_faulty(scan: np.ndarray, misses: np.ndarray, rig: Rig) -> None:
     sensor = rig.sensor
     first, last = (sensor.first, sensor.first + sensor.field - 1) if sensor.field > 0 else (0, sensor.beams - 1)
     before = _last_before_the_first(scan, rig)
+    many = _keep_up(scan[first : last + 1], misses[first : last + 1], sensor.range_max)
+    if not (many or before >= -scan.size or _begins_with_gap(scan[first : last + 1], sensor.range_max)):
+        return
     for n in range(first, last + 1):
         if not scan[n] < sensor.range_max:
-            if misses[n] >= PATIENCE:
-                scan[n] = math.nan
             continue
-        misses[n] = 0
         if 1 < n - before <= TOGETHER + 1 and _one_surface(scan[before], scan[n], n - before, rig):
             for beside in range(before + 1, n):
                 k = beside % scan.size
@@ -41,6 +41,37 @@ def leave_out_faulty(scan: np.ndarray, misses: np.ndarray, rig: Rig) -> None:
                 if misses[k] >= PATIENCE:
                     scan[k] = math.nan
         before = n
+
+
+@jit_inner
+def _keep_up(scan: np.ndarray, misses: np.ndarray, range_max: float) -> bool:
+    """Forgive beams that see something, write NaN over those that have missed too much.
+
+    Tell whether any of the others may have been missed between two that see, which seldom is so. Without branches.
+    """
+    far, patience, late = np.float32(range_max), np.uint8(PATIENCE), 0
+    for n in range(scan.size):
+        sees = scan[n] < far
+        late += (not sees) & (misses[n] >= patience)
+        misses[n] = np.uint8(0) if sees else misses[n]
+    if late > 0:
+        for n in range(scan.size):
+            if misses[n] >= patience:
+                scan[n] = math.nan
+    missed, one, two, three, four = 0, scan[1:], scan[2:], scan[3:], scan[4:]
+    for n in range(scan.size - TOGETHER - 1):
+        before = (scan[n] < far) | (one[n] < far) | (two[n] < far)
+        missed += (four[n] < far) & (not three[n] < far) & before
+    return missed > 0
+
+
+@jit_inner
+def _begins_with_gap(scan: np.ndarray, range_max: float) -> bool:
+    """Tell whether one of the first beams sees nothing though one before it does."""
+    ends = 0
+    for n in range(1, min(TOGETHER + 1, scan.size)):
+        ends += scan[n - 1] < range_max and not scan[n] < range_max
+    return ends > 0
 
 
 @jit_inner

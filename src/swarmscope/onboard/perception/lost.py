@@ -30,13 +30,16 @@ THROUGH = 0.1
 """A beam that is off a place by less than this part of the way to the next has looked there."""
 MEMORY = 0.9
 """What stays of the share of lost returns from tick to tick."""
-PASSED = 0.3
+PASSED = np.float32(0.3)
 """What was passed by so many times its distance is looked for in earnest, ..."""
-ROUGHLY = PASSED**5 / 5.0
+ROUGHLY = float(PASSED) ** 5 / 5.0
 """... for the rest two terms of the arc tangent do, which err by less than this [rad]."""
+SINGLE = 2e-6
+"""What single precision may be wrong by in the number of a beam, as a part of all beams."""
+THIRD = np.float32(1.0 / 3.0)
 FEWEST_SCANS = 3.0
 """It is kept for so many scans at least, however slowly they come: what one beam sees may be lost twice in a row."""
-DROPPED = np.float32(-1e9)
+DROPPED, UNKNOWN = np.float32(-1e9), np.float32(math.nan)
 SLIPS = 2
 MOST_TICKS = GUARD_ALONE - 1
 
@@ -141,18 +144,19 @@ def _find_beams(see: View, here: Pose, most: int) -> None:
     """Write into ``see.padded`` by how many beams the returns of the last scan are displaced now, within `ROUGHLY`.
 
     `DROPPED` where nothing was near enough, or it has been kept for ``most`` ticks; NaN where it has moved on so far
-    that this is not good enough. Without branches, so that it is done for several beams at a time.
+    that this is not good enough. Without branches and in single precision, so that it is done for many beams at a time.
     """
-    rig, (x0, y0, yaw) = see.rig, here
-    least, far = np.float32(least_range(rig)), np.float32(WITHIN * rig.sensor.range_max)
-    turned, per_increment = yaw / rig.sensor.increment, 1.0 / rig.sensor.increment
-    for n in range(rig.sensor.beams):
-        s = see.kept[n]
-        ahead = s - x0 * rig.cos[n] - y0 * rig.sin[n]
-        passed = (x0 * rig.sin[n] - y0 * rig.cos[n]) / ahead
+    rig, sensor = see.rig, see.rig.sensor
+    x0, y0 = np.float32(here[0]), np.float32(here[1])
+    least, far = np.float32(least_range(rig)), np.float32(WITHIN * sensor.range_max)
+    turned, per_increment = np.float32(here[2] / sensor.increment), np.float32(1.0 / sensor.increment)
+    for n in range(sensor.beams):
+        s, c, si = see.kept[n], np.float32(rig.cos[n]), np.float32(rig.sin[n])
+        ahead = s - x0 * c - y0 * si
+        passed = (x0 * si - y0 * c) / ahead
         near = (ahead > 0.0) & (abs(passed) < PASSED)
         dropped = (not s >= least) | (not s < far) | ((see.unseen[n] & MOST_TICKS) >= most)
-        displaced = (passed - passed**3 / 3.0) * per_increment - turned if near else math.nan
+        displaced = (passed - passed * passed * passed * THIRD) * per_increment - turned if near else UNKNOWN
         see.padded[n] = DROPPED if dropped else displaced
 
 
@@ -162,7 +166,7 @@ def _is_seen(see: View, n: int) -> bool:
     displaced = see.padded[n]
     if displaced == DROPPED:
         return True
-    slack = ROUGHLY / see.rig.sensor.increment + 1e-6 * see.rig.sensor.beams
+    slack = ROUGHLY / see.rig.sensor.increment + SINGLE * see.rig.sensor.beams
     between = n + displaced
     if not (between >= slack and between < see.rig.sensor.beams - 2):
         return False

@@ -21,6 +21,8 @@ SKIN_M = 0.01
 EXACT = (1.0, 0.7)
 """Gains where positioning does not err: what changes is the neighbour's speed."""
 SEEN_TWICE = 2
+MOST_COUNTED = 255
+"""Ticks since the first are counted up to here."""
 STILL_RADIUS = 0.08
 """A neighbour that stays within this of one place stands still [m]."""
 
@@ -32,6 +34,7 @@ def update_odometry(percept: Row, shared: Row) -> tuple[float, float]:
         shared["started"] = 1
         shared["compass"] = percept["compass"]
         return 0.0, 0.0
+    shared["started"] = min(MOST_COUNTED, shared["started"] + 1)
     c, s = math.cos(shared["compass"]), math.sin(shared["compass"])
     dx = c * percept["odom_x"] - s * percept["odom_y"]
     dy = s * percept["odom_x"] + c * percept["odom_y"]
