@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import operator
+from functools import lru_cache
 from itertools import pairwise
 from typing import Annotated, Any, Literal, NamedTuple, Self
 
@@ -409,7 +410,13 @@ def _check_motion(disc: Circle) -> None:
 
 def _convex_parts(polygon: Polygon) -> tuple[Floats, list[Floats]]:
     """Return the outline (n, 2) counter-clockwise, and convex parts that fill it; a ValueError says what is wrong."""
-    points = _without_repeats(np.asarray(polygon.points, dtype=np.float64))
+    return _parts_inside(np.asarray(polygon.points, dtype=np.float64).tobytes())
+
+
+@lru_cache(maxsize=4096)
+def _parts_inside(corners: bytes) -> tuple[Floats, list[Floats]]:
+    """Do the work of `_convex_parts`, once for the same corners: a polygon is checked and compiled several times."""
+    points = _without_repeats(np.frombuffer(corners).reshape(-1, 2).copy())
     turns, cross = _turns(points)
     if float(np.sum(turns)) < 0.0:
         points = np.ascontiguousarray(points[::-1])

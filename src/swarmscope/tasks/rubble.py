@@ -68,11 +68,12 @@ def make(seed: int, robots: int = 15, radius: float = 0.15, **options: Option) -
 def _rubble(rng: np.random.Generator, size: float, covered: float) -> list[Obstacle]:
     """Return things within the square until they cover this share of it."""
     things: list[Obstacle] = []
-    while covered > 0.0:
-        things += [_thing(rng, size) for _ in range(AT_A_TIME)]
-        world = compile_world(WorldSpec(obstacles=things, bounds=(0.0, 0.0, size, size)))
-        if rasterise(world, 0.0, (0.0, 0.0, size, size), COUNTED_M).blocked.mean() >= covered:
-            break
+    square, under = (0.0, 0.0, size, size), np.zeros(1, bool)
+    while under.mean() < covered:
+        more: list[Obstacle] = [_thing(rng, size) for _ in range(AT_A_TIME)]
+        world = compile_world(WorldSpec(obstacles=more, bounds=square))
+        under = under | rasterise(world, 0.0, square, COUNTED_M).blocked
+        things += more
     return things
 
 
