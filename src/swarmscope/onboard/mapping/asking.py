@@ -50,6 +50,8 @@ SMALL_M = 1.5
 """What is smaller along both axes is not told: the way round it is hardly longer."""
 SHARE = 0.25
 """Of the time between two answers to one robot, that between two to robots that have never been in sight."""
+DOUBT_S = 20.0
+"""So long nobody who has never been in sight is believed after one of them was wrong."""
 TRIES = 3
 """What does not fit into a packet is traced anew, with fewer cells, so often."""
 
@@ -131,7 +133,8 @@ def _sender(see: View, memory: Row, talk: Talk, place: Place) -> Sender:
     in_sight = name != STRANGERS
     if slot_of(memory, see.header[1]) >= 0:
         name = see.header[1]
-    lies = place.frame == 0 or distrusts(memory, name, now, talk.keep_s)
+    doubted_s = min(DOUBT_S, talk.keep_s) if name == STRANGERS else talk.keep_s
+    lies = place.frame == 0 or distrusts(memory, name, now, doubted_s)
     if lies or (in_sight and not agree(memory, place, x, y)):
         return Sender(NOBODY, False, Spot(0.0, 0.0))
     at = Spot(x / talk.cell_m, y / talk.cell_m)

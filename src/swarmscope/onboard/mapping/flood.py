@@ -64,7 +64,7 @@ def flood(memory: Row, u0: float, v0: float, u1: float, v1: float) -> bool:
 
 @jit
 def _frame(memory: Row, u0: float, v0: float, u1: float, v1: float) -> Frame:
-    """Return the frame of all that is known, in whole pages.
+    """Return the frame of all that is known and told, in whole pages, with room to go round it.
 
     Where that is more than the scratch holds, what is far from the robot is left out.
     """
@@ -74,15 +74,37 @@ def _frame(memory: Row, u0: float, v0: float, u1: float, v1: float) -> Frame:
     for side in range(-1, 2, 2):
         for u, v in ((u0, v0), (u1, v1)):
             margin = reach if u == u0 else MARGIN
-            kx = (int(math.floor(u / NODE)) + side * margin) >> PAGE_BITS
-            ky = (int(math.floor(v / NODE)) + side * margin) >> PAGE_BITS
+            kx, ky = _page_of(u, side * margin), _page_of(v, side * margin)
             west, east, south, north = min(west, kx), max(east, kx), min(south, ky), max(north, ky)
     for k in range(memory["pages_n"]):
-        west, east = min(west, memory["page_x"][k]), max(east, memory["page_x"][k])
-        south, north = min(south, memory["page_y"][k]), max(north, memory["page_y"][k])
+        sides = _goes_on(memory, k)
+        west, east = min(west, memory["page_x"][k] - (sides & 1)), max(east, memory["page_x"][k] + (sides >> 1 & 1))
+        south, north = min(south, memory["page_y"][k] - (sides >> 2 & 1)), max(north, memory["page_y"][k] + (sides >> 3))
+    for a in range(memory["answers_n"]):
+        box = memory["answer_box"][a]
+        west, east = min(west, _page_of(box[0], -MARGIN)), max(east, _page_of(box[1], MARGIN))
+        south, north = min(south, _page_of(box[2], -MARGIN)), max(north, _page_of(box[3], MARGIN))
     west, east = max(west, px - MOST_PAGES // 2), min(east, px + MOST_PAGES // 2 - 1)
     south, north = max(south, py - MOST_PAGES // 2), min(north, py + MOST_PAGES // 2 - 1)
     return Frame(west * WORD, south * WORD, east - west + 1, (north - south + 1) * WORD)
+
+
+@jit_inline
+def _page_of(at: float, nodes: int) -> int:
+    """Return the number of the page so many nodes beyond a place [cells]."""
+    return (int(math.floor(at / NODE)) + nodes) >> PAGE_BITS
+
+
+@jit_inner
+def _goes_on(memory: Row, k: int) -> int:
+    """Return on which sides of page ``k`` something stands at its edge: west 1, east 2, south 4, north 8."""
+    rows = memory["rows"][k]
+    found = ZERO
+    for y in range(WORD):
+        found |= rows[y]
+    west, east = number(found & ONE), number(found >> np.uint64(WORD - 1))
+    south, north = 4 if rows[0] != ZERO else 0, 8 if rows[WORD - 1] != ZERO else 0
+    return west + 2 * east + south + north
 
 
 @jit_inline

@@ -116,9 +116,10 @@ def note_wrong(memory: Row, k: int, now_s: float) -> None:
             memory["answer_wrong"][a] += 1 - memory["heard_free"][k]
             memory["heard_free"][k] = 1
             if memory["answer_wrong"][a] >= min(WRONG, n):
-                at = number(memory["wrong_at"])
-                memory["wrong_id"][at], memory["wrong_s"][at] = memory["answer_from"][a], now_s
-                memory["wrong_at"] = (at + 1) % WRONGED
+                if memory["answer_wrong"][a] >= WRONG:
+                    at = number(memory["wrong_at"])
+                    memory["wrong_id"][at], memory["wrong_s"][at] = memory["answer_from"][a], now_s
+                    memory["wrong_at"] = (at + 1) % WRONGED
                 drop_answer(memory, a)
                 memory["opened"] = 1
             return
