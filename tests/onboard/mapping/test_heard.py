@@ -6,11 +6,20 @@ import itertools
 
 import numpy as np
 import pytest
-from drawn_maps import map_of
+from drawn_maps import map_of, way_of
 
 from swarmscope.onboard.mapping.cells import FULL, LEAST, LESS, PHASES, ask_for, is_open
 from swarmscope.onboard.mapping.flood import flood
-from swarmscope.onboard.mapping.heard import ANSWERS, HEARD, distrusts, forget_heard, hear, note_wrong, review_heard
+from swarmscope.onboard.mapping.heard import (
+    ANSWERS,
+    HEARD,
+    distrusts,
+    forget_heard,
+    hear,
+    note_wrong,
+    review_heard,
+    told_cell,
+)
 from swarmscope.onboard.mapping.way import find_way, forget_and_find
 from swarmscope.onboard.mapping.words import Spot
 
@@ -74,10 +83,11 @@ def test_enough_cells_that_are_seen_free_make_the_whole_answer_wrong():
     assert not distrusts(memory, 4, 1.0, 60.0)
     assert memory["answers_n"] == memory["heard_n"] == 1
     assert memory["opened"] == 1
-    assert memory["heard_u"][0] == 100.5
+    assert told_cell(memory, 0)[0] == 100.5
     assert not is_open(memory, 100.5, 0.5)
-    note_wrong(memory, 0, 1.0)
+    note_wrong(memory, 0, 3.0)
     assert memory["answers_n"] == 0
+    assert not distrusts(memory, 3, 62.0, 60.0)  # one cell of a whole answer that was free is no lie
 
 
 def test_old_answers_go():
@@ -92,12 +102,12 @@ def test_old_answers_go():
 def test_the_oldest_give_way_to_new_ones():
     memory = map_of()
     for k in range(ANSWERS + 3):
-        assert told(memory, [(100.0 * k, 0.5), (100.0 * k + 3.0, 0.5)], now_s=float(k))
+        assert told(memory, [(30.0 * k, 0.5), (30.0 * k + 3.0, 0.5)], now_s=float(k))
     assert memory["answers_n"] == ANSWERS
     assert memory["answer_s"][:ANSWERS].tolist() == [float(k) for k in range(3, ANSWERS + 3)]
-    assert memory["heard_u"][0] == 300.0
-    assert memory["answer_box"][0].tolist() == [300.0, 303.0, 0.5, 0.5]
-    far = [(1e4 + 5.0 * k, 0.5) for k in range(HEARD)]
+    assert told_cell(memory, 0)[0] == 90.0
+    assert memory["answer_box"][0].tolist() == [90.0, 93.0, 0.5, 0.5]
+    far = [(2000.0 + k, 0.5) for k in range(HEARD)]
     assert told(memory, far)
     assert memory["answers_n"] == 1
     assert not told(memory, [(2e4 + 5.0 * k, 0.5) for k in range(HEARD + 1)])
@@ -130,3 +140,19 @@ def test_forgetting_says_whether_there_was_anything():
     told(memory, WALL)
     assert forget_heard(memory)
     assert is_open(memory, 20.5, 0.5)
+
+
+def test_ways_go_round_what_was_told_of_places_beyond_all_that_is_known():
+    """A flood looks at what is known; a wall that somebody has told of may end where nobody here has been."""
+    memory = map_of()
+    wall = [(60.5, -402.5 + 4.0 * k) for k in range(180)]
+    assert told(memory, wall)
+    assert flood(memory, *HERE, 120.5, 0.5)
+    assert max(v for _, v in way_of(memory)) > wall[-1][1]
+
+
+def test_what_is_told_of_places_too_far_to_note_is_left():
+    memory = map_of()
+    assert not told(memory, [(20.5, 0.5), (4096.0, 0.5)])
+    assert not told(memory, [(20.5, float("nan"))])
+    assert memory["answers_n"] == memory["heard_n"] == 0

@@ -15,7 +15,7 @@ from swarmscope.onboard.mapping.answering import closed_place
 from swarmscope.onboard.mapping.cells import LEAST
 from swarmscope.onboard.mapping.evidence import closes, is_passed
 from swarmscope.onboard.mapping.frames import agree, is_shared, keep_frame, own_place, spot_of
-from swarmscope.onboard.mapping.heard import distrusts, hear, note_wrong, review_heard
+from swarmscope.onboard.mapping.heard import distrusts, hear, note_wrong, review_heard, told_cell
 from swarmscope.onboard.mapping.memory import TALK
 from swarmscope.onboard.mapping.met import NOBODY, STRANGERS, note_heard, slot_of
 from swarmscope.onboard.mapping.news import keep_news
@@ -103,7 +103,8 @@ def _doubt(see: View, memory: Row, cell_m: float) -> None:
     u, v = see.shared["x"] / cell_m, see.shared["y"] / cell_m
     k = memory["ticks"] % EVERY
     while k < memory["heard_n"]:
-        if is_passed(see, memory["heard_u"][k] - u, memory["heard_v"][k] - v, cell_m):
+        at_u, at_v = told_cell(memory, k)
+        if is_passed(see, at_u - u, at_v - v, cell_m):
             note_wrong(memory, k, see.percept["now_s"])
         k += EVERY
 

@@ -15,6 +15,7 @@ import numpy as np
 from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.geometry import point_segment_distance
 from swarmscope.onboard.mapping.cells import FULL, LEAST, NODE, NODES, RIM, WIDE, is_fine, node_place, open_way
+from swarmscope.onboard.mapping.heard import told_cell
 from swarmscope.onboard.mapping.memory import CORNERS
 from swarmscope.onboard.mapping.pages import NO_PAGE, PAGE_BITS
 from swarmscope.onboard.mapping.words import ONE, WORD, ZERO, Spot, bit, lowest, number, without_lowest
@@ -64,7 +65,7 @@ def flood(memory: Row, u0: float, v0: float, u1: float, v1: float) -> bool:
 
 @jit
 def _frame(memory: Row, u0: float, v0: float, u1: float, v1: float) -> Frame:
-    """Return the frame of all that is known and told, in whole pages, with room to go round it.
+    """Return the frame of all that is known, in whole pages, and of what was told, with room to go round that.
 
     Where that is more than the scratch holds, what is far from the robot is left out.
     """
@@ -77,9 +78,8 @@ def _frame(memory: Row, u0: float, v0: float, u1: float, v1: float) -> Frame:
             kx, ky = _page_of(u, side * margin), _page_of(v, side * margin)
             west, east, south, north = min(west, kx), max(east, kx), min(south, ky), max(north, ky)
     for k in range(memory["pages_n"]):
-        sides = _goes_on(memory, k)
-        west, east = min(west, memory["page_x"][k] - (sides & 1)), max(east, memory["page_x"][k] + (sides >> 1 & 1))
-        south, north = min(south, memory["page_y"][k] - (sides >> 2 & 1)), max(north, memory["page_y"][k] + (sides >> 3))
+        west, east = min(west, memory["page_x"][k]), max(east, memory["page_x"][k])
+        south, north = min(south, memory["page_y"][k]), max(north, memory["page_y"][k])
     for a in range(memory["answers_n"]):
         box = memory["answer_box"][a]
         west, east = min(west, _page_of(box[0], -MARGIN)), max(east, _page_of(box[1], MARGIN))
@@ -93,18 +93,6 @@ def _frame(memory: Row, u0: float, v0: float, u1: float, v1: float) -> Frame:
 def _page_of(at: float, nodes: int) -> int:
     """Return the number of the page so many nodes beyond a place [cells]."""
     return (int(math.floor(at / NODE)) + nodes) >> PAGE_BITS
-
-
-@jit_inner
-def _goes_on(memory: Row, k: int) -> int:
-    """Return on which sides of page ``k`` something stands at its edge: west 1, east 2, south 4, north 8."""
-    rows = memory["rows"][k]
-    found = ZERO
-    for y in range(WORD):
-        found |= rows[y]
-    west, east = number(found & ONE), number(found >> np.uint64(WORD - 1))
-    south, north = 4 if rows[0] != ZERO else 0, 8 if rows[WORD - 1] != ZERO else 0
-    return west + 2 * east + south + north
 
 
 @jit_inline
@@ -177,10 +165,10 @@ def _close_told(memory: Row, frame: Frame) -> None:
     r, first = memory["disc_r"][LEAST], 0
     for a in range(memory["answers_n"]):
         for k in range(first, first + memory["answer_n"][a]):
-            u, v = float(memory["heard_u"][k]), float(memory["heard_v"][k])
+            u, v = told_cell(memory, k)
             wu, wv = u, v
             if k > first:
-                wu, wv = float(memory["heard_u"][k - 1]), float(memory["heard_v"][k - 1])
+                wu, wv = told_cell(memory, k - 1)
                 if (wu - u) ** 2 + (wv - v) ** 2 > 4.0 * r * r:
                     wu, wv = u, v
             _close_line(memory, frame, (wu, wv), (u, v), r)

@@ -6,15 +6,21 @@ cells of one answer stand or fall together: where the robot sees for itself that
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.onboard.mapping.words import number
 from swarmscope.onboard.percept import Row
 
-HEARD = 512
-"""Cells that are remembered at once."""
-ANSWERS = 24
+HEARD = 2048
+"""Cells that are remembered at once: where few are, a robot is told of one dead end while it forgets another."""
+GRAIN = 8.0
+"""Parts of a cell that a place is remembered in, as a whole number."""
+FARTHEST = 4095.0
+"""And so far from where the robot began [cells]."""
+ANSWERS = 64
 """Answers that are."""
 WRONG = 3
 """So many cells of an answer that turn out to be free make all of it wrong."""
@@ -22,6 +28,12 @@ WRONGED = 8
 """Senders that are remembered for what they told wrong."""
 LEAST = 2
 """The room that told cells keep free (``cells.LEAST``)."""
+
+
+@jit_inline
+def told_cell(memory: Row, k: int) -> tuple[float, float]:
+    """Return where told cell ``k`` is [cells]."""
+    return memory["heard_u"][k] / GRAIN, memory["heard_v"][k] / GRAIN
 
 
 @jit_inline
@@ -47,7 +59,8 @@ def _is_within(memory: Row, u: float, v: float, r: float) -> bool:
         box = memory["answer_box"][a]
         if box[0] - r < u < box[1] + r and box[2] - r < v < box[3] + r:
             for k in range(first, first + n):
-                du, dv = memory["heard_u"][k] - u, memory["heard_v"][k] - v
+                at_u, at_v = told_cell(memory, k)
+                du, dv = at_u - u, at_v - v
                 if du * du + dv * dv < r * r:
                     return True
         first += n
@@ -62,6 +75,9 @@ def hear(memory: Row, cells: np.ndarray, n: int, now_s: float, sender: int) -> b
     """
     if not 0 < n <= HEARD:
         return False
+    for k in range(n):
+        if not (abs(cells[k, 0]) <= FARTHEST and abs(cells[k, 1]) <= FARTHEST):
+            return False
     while memory["answers_n"] == ANSWERS or memory["heard_n"] + n > HEARD:
         drop_answer(memory, 0)
     a, first = memory["answers_n"], memory["heard_n"]
@@ -69,7 +85,9 @@ def hear(memory: Row, cells: np.ndarray, n: int, now_s: float, sender: int) -> b
     box[0], box[1], box[2], box[3] = cells[0, 0], cells[0, 0], cells[0, 1], cells[0, 1]
     for k in range(n):
         u, v = cells[k, 0], cells[k, 1]
-        memory["heard_u"][first + k], memory["heard_v"][first + k], memory["heard_free"][first + k] = u, v, 0
+        memory["heard_u"][first + k] = int(math.floor(GRAIN * u + 0.5))
+        memory["heard_v"][first + k] = int(math.floor(GRAIN * v + 0.5))
+        memory["heard_free"][first + k] = 0
         box[0], box[1] = min(box[0], u), max(box[1], u)
         box[2], box[3] = min(box[2], v), max(box[3], v)
     memory["answer_n"][a], memory["answer_s"][a], memory["answer_wrong"][a] = n, now_s, 0

@@ -114,8 +114,8 @@ MAP = np.dtype(
         ("leave", np.float64),  # compass frame [rad]
         # what others have told: cells, answer after answer, the oldest first
         ("heard_n", np.int64),
-        ("heard_u", np.float32, HEARD),  # [cells]
-        ("heard_v", np.float32, HEARD),
+        ("heard_u", np.int16, HEARD),  # [cells / GRAIN]
+        ("heard_v", np.int16, HEARD),
         ("heard_free", np.uint8, HEARD),  # 1: has been seen to be free
         ("answers_n", np.int64),
         ("answer_n", np.int16, ANSWERS),  # cells of each
