@@ -379,6 +379,7 @@ WRONG_ROBOTS = [
     ({"address": NAN}, "address"), ({"rate_hz": 0.0}, "rate_hz"),
     ({"rate_hz": NAN}, "rate_hz"), ({"rate_hz": -5}, "rate_hz"), ({"look_ahead_m": NAN}, "look_ahead_m"),
     ({"clearance_m": -0.1}, "clearance_m"), ({"margin_m": "wide"}, "margin_m"),
+    ({"first_scans": 101}, "first_scans"), ({"first_scans": 2.5}, "first_scans"), ({"first_scans": NAN}, "first_scans"),
     ({"params": {"w_i": NAN}}, "planner 'nav-scope': w_i"),
     ({"planner": "oracle"}, "planner"), ({"planner": None}, "planner"), ({"planner": 7}, "planner"),
 ]  # fmt: skip

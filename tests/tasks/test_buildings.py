@@ -25,8 +25,7 @@ def boxes_of(setup):
 @pytest.mark.parametrize("depart", ["at_once", "staggered", "convoy"])
 @pytest.mark.parametrize("ways", ["one", "two", "any"])
 def test_every_kind_of_trip_can_be_made(name, depart, ways):
-    less = {"covered": 0.2} if name == "rubble" else {}  # which is made sooner
-    setup = load_task(name).make(4, robots=15, depart=depart, ways=ways, **less)
+    setup = load_task(name).make(4, robots=15, depart=depart, ways=ways)
     check_setup(setup, 0.15)
     wanted = None if depart == "at_once" else (8.0 * np.arange(15)).tolist()
     assert (None if setup.start_s is None else setup.start_s.tolist()) == wanted

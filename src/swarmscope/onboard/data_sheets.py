@@ -24,6 +24,8 @@ DEFAULTS: dict[str, Any] = {**GUARDING._asdict(), **SAFETY._asdict(), **SHARING.
 del DEFAULTS["enabled"]
 BOOTS = 65536
 """Boot numbers."""
+MOST_FIRST_SCANS = 100
+"""A robot may wait for so many scans; fewer than ticks are counted (``tracks.MOST_COUNTED``), or it never sets off."""
 
 
 def planner_of(planner: str | Planner) -> Planner:
@@ -49,6 +51,9 @@ def options_of(given: Mapping[str, float | None]) -> dict[str, Any]:
         checked[name] = finite(value, name)
         if checked[name] < 0.0:
             raise ConfigError(name, f"must be at least 0, not {value!r}")
+    scans = checked["first_scans"]
+    if scans != int(scans) or scans > MOST_FIRST_SCANS:
+        raise ConfigError("first_scans", f"must be a whole number up to {MOST_FIRST_SCANS}, not {scans:g}")
     if checked["feature_mask"] not in (-1, *MASKS.values()):
         codes = ", ".join(f"{code} ({name})" for name, code in MASKS.items())
         raise ConfigError("feature_mask", f"must be one of {codes}")

@@ -13,6 +13,7 @@ from typing import Annotated, Any, Final, Literal, Self
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag, model_validator
 
 from swarmscope.onboard.body import Body
+from swarmscope.onboard.data_sheets import MOST_FIRST_SCANS
 from swarmscope.onboard.lidar import LEAST_VIEW_DEG, Lidar
 from swarmscope.onboard.rig import Guarding, Safety, Sharing
 from swarmscope.sim.loop import Setting
@@ -233,7 +234,7 @@ class GuardModel(_Strict):
     as fast as the fastest disc that moves in this world, 0: there are none [m/s]."""
     strangers_m: Annotated[float, Field(ge=-1.0, le=1000.0), NUMBER] = GUARDING.strangers_m
     """Radius of the smallest of them; 0 and below: of the smallest disc that moves here, 0.2 m without one [m]."""
-    first_scans: Annotated[int, Field(ge=-1, le=100), NUMBER] = GUARDING.first_scans
+    first_scans: Annotated[int, Field(ge=-1, le=MOST_FIRST_SCANS), NUMBER] = GUARDING.first_scans
     """A robot takes so many scans, and turns a little between them, before it sets off; below 0: three where
     ``noise.dropout`` or ``noise.stuck`` is above 0, else one."""
 

@@ -110,7 +110,7 @@ def test_the_oldest_give_way_to_new_ones():
     far = [(2000.0 + k, 0.5) for k in range(HEARD)]
     assert told(memory, far)
     assert memory["answers_n"] == 1
-    assert not told(memory, [(2e4 + 5.0 * k, 0.5) for k in range(HEARD + 1)])
+    assert not told(memory, [(2000.0 + k, 0.5) for k in range(HEARD + 1)])
 
 
 @pytest.mark.parametrize("half", [4.0, 6.0])
