@@ -22,8 +22,8 @@ NOISY = {
     "radio": {"loss": 0.2, "latency_s": 0.2},
 }
 PROMISED = """arrival_rate path_redundancy path_redundancy_all path_stretch path_stretch_any_angle spl duration_s
-collisions min_clearance_m fusions messages bytes_sent bytes_on_air mean_package_bytes bandwidth_kbps requests waiting_s
-plan_us_p50 plan_us_p99 planner_memory_bytes run versions failures measured"""
+collisions min_clearance_m fusions messages bytes_sent bytes_on_air air_bps mean_package_bytes bandwidth_kbps
+requests waiting_s plan_us_p50 plan_us_p99 planner_memory_bytes run versions failures measured"""
 
 
 def scenario_of(**values):

@@ -102,7 +102,7 @@ def drive_alike(name, lidar, noise):
     return packets
 
 
-SILENT = ("nav-i", "sfm-i", "dh-bug", "orca", "giwt-cnn", "giwt", "giwt-gat", "giwt-sage", "atlas")
+SILENT = ("nav-i", "sfm-i", "dh-bug", "orca", "giwt-cnn", "giwt", "giwt-gat", "giwt-sage", "atlas", "atlas-mute")
 """Who asks nobody, or whom the scene gives no reason to."""
 
 

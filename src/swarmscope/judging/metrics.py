@@ -60,6 +60,7 @@ COUNTED: list[Metric] = [
     Metric("messages", "", "lower", "packets sent, all robots"),
     Metric("bytes_sent", "B", "lower", "payload sent, all robots"),
     Metric("bytes_on_air", "B", "lower", "payload and the link's own overhead, all robots"),
+    Metric("air_bps", "bit/s", "lower", "payload and the link's own overhead per robot and second of the run"),
     Metric("bandwidth_kbps", "kbps", "lower", "payload sent by all robots per second of the run"),
     Metric("mean_package_bytes", "B", "lower", "mean size of a packet of features"),
     Metric("planner_memory_bytes", "B", "lower", "planner memory of one robot"),

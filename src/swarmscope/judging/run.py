@@ -176,6 +176,7 @@ def figures(outcome: Outcome) -> dict[str, Any]:
         "requests": int(robots["sent"].sum()) - features,
         "bytes_sent": int(robots["bytes"].sum()),
         "bytes_on_air": int(robots["air_bytes"].sum()),
+        "air_bps": float(8.0 * robots["air_bytes"].mean() / simulated),
         "mean_package_bytes": float(robots["feature_bytes"].sum() / features) if features else None,
         "bandwidth_kbps": float(8.0 * robots["bytes"].sum() / simulated / KILO),
         "packets_lost": int(robots["lost"].sum()),

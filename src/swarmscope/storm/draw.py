@@ -107,8 +107,6 @@ def _draw_once(
     values: dict[str, Any] = {"record_scans": "no", "seed": int(rng.integers(2**31))}
     values["robots"] = round(number(rng, ROBOTS))
     values["planner"] = {"name": planners[int(rng.integers(len(planners)))]}
-    if values["planner"]["name"] == "atlas":
-        values["planner"]["params"] = {"share": int(rng.integers(2))}
     _set_each(values, rng, SHEET, 1.0)
     values["robot"]["half_width_m"] = values["robot"]["radius_m"]
     all_round, view = rng.random() < ALL_ROUND, number(rng, VIEW_DEG)

@@ -17,8 +17,8 @@ from swarmscope.storm.play import Storm, draw_job, make_job, play_job
 from swarmscope.storm.shrink import breach_of, shrink
 from swarmscope.storm.watch import Breach
 
-LEFT_OUT = ("oracle", "giwt", "giwt-cnn", "giwt-gat", "giwt-sage")
-"""Told by a map, or networks: only when named."""
+LEFT_OUT = ("oracle", "giwt", "giwt-cnn", "giwt-gat", "giwt-sage", "atlas-scan", "atlas-maps", "atlas-all")
+"""Told by a map, networks, or for comparison: only when named."""
 
 
 class Until(NamedTuple):

@@ -127,8 +127,10 @@ def test_what_comes_too_late_is_left():
 
 def test_nobody_sends_more_than_its_share_of_the_air():
     pair = Pair(WALL, budget_bps=80.0, ask_s=0.2, ask_again_s=0.2).go(200)
-    sent = sum(len(data) for mine, _, data in pair.sent if mine)
-    assert 0 < 8 * sent <= 80.0 * (200 * DT + 2.0) + 8 * 50
+    sent = sum(len(data) + 23 for mine, _, data in pair.sent if mine)
+    assert 0 < 8 * sent <= 80.0 * (200 * DT + 10.0) + 8 * 73
+    bare = Pair(WALL, budget_bps=80.0, ask_s=0.2, ask_again_s=0.2, link_bytes=0).go(200)
+    assert sent < sum(len(data) for mine, _, data in bare.sent if mine) + 23 * len(bare.kinds(of_asker=True))
 
 
 def test_small_things_are_not_told():

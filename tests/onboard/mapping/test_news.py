@@ -8,8 +8,9 @@ from drawn_maps import map_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from swarmscope.onboard.mapping.heard import hear, is_told_closed
-from swarmscope.onboard.mapping.news import keep_news
+from swarmscope.onboard.mapping.cells import set_cell
+from swarmscope.onboard.mapping.heard import drop_cell, hear, is_told_closed, told_cell
+from swarmscope.onboard.mapping.news import EVERY, keep_news, trust_own_eyes
 
 WALL = [(20.5, 3.0 * k + 0.5) for k in range(-12, 13)]
 
@@ -44,14 +45,61 @@ def test_of_what_is_partly_known_the_next_known_cell_stays():
     assert kept(memory, WALL) == WALL[9:21]
 
 
-@pytest.mark.parametrize("aside", [-1, 0, 1])
+@pytest.mark.parametrize("aside", [-3, 0, 3])
 def test_what_the_robot_has_seen_itself_is_none(aside):
     seen = [(int(u) + aside, int(np.floor(v))) for u, v in WALL]
     assert kept(map_of(*seen), WALL) == []
 
 
-def test_what_is_two_cells_beside_what_it_has_seen_is_news():
-    assert kept(map_of(*[(22, int(np.floor(v))) for _, v in WALL]), WALL) == WALL
+def test_what_is_four_cells_beside_what_it_has_seen_is_news():
+    assert kept(map_of(*[(24, int(np.floor(v))) for _, v in WALL]), WALL) == WALL
+
+
+def told_cells(memory):
+    return [told_cell(memory, k) for k in range(int(memory["heard_n"]))]
+
+
+def trust(memory):
+    """As often as it takes until all told cells had their turn."""
+    for _ in range(EVERY):
+        trust_own_eyes(memory)
+        memory["ticks"] += 1
+
+
+def test_what_the_robot_has_seen_by_now_it_knows_better():
+    """A told wall 0.1 m aside would close a gap between its end and another wall to the robot's least disc."""
+    memory = map_of()
+    told(memory, [(40.5, 3.5), (43.5, 3.5)])
+    told(memory, WALL)
+    for _, v in WALL[:20]:
+        set_cell(memory, 18, int(np.floor(v)))
+    trust(memory)
+    assert told_cells(memory) == [(40.5, 3.5), (43.5, 3.5), *WALL[20:]]
+    assert memory["answer_n"][:2].tolist() == [2, len(WALL[20:])]
+    for _, v in WALL[20:]:
+        set_cell(memory, 18, int(np.floor(v)))
+    trust(memory)
+    assert told_cells(memory) == [(40.5, 3.5), (43.5, 3.5)]
+    assert memory["answers_n"] == 1
+    assert memory["opened"] == 1
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.lists(st.integers(1, 9), min_size=1, max_size=8), st.data())
+def test_a_told_cell_that_is_dropped_leaves_all_others_as_they_are(sizes, data):
+    memory, left = map_of(), []
+    for a, n in enumerate(sizes):
+        cells = [(float(a), float(k)) for k in range(n)]
+        told(memory, cells)
+        left.append(cells)
+    while left:
+        a = data.draw(st.integers(0, len(left) - 1))
+        k = data.draw(st.integers(0, len(left[a]) - 1))
+        drop_cell(memory, a, sum(map(len, left[:a])) + k)
+        del left[a][k]
+        left = [cells for cells in left if cells]
+        assert told_cells(memory) == [cell for cells in left for cell in cells]
+        assert memory["answer_n"][: int(memory["answers_n"])].tolist() == list(map(len, left))
 
 
 LISTS = st.lists(st.tuples(st.integers(-60, 60), st.integers(-60, 60)), min_size=1, max_size=60)

@@ -10,26 +10,24 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from swarmscope._jit import jit, jit_inline, jit_inner
+from swarmscope._jit import jit, jit_inner
 from swarmscope.onboard.mapping.answering import closed_place
 from swarmscope.onboard.mapping.cells import LEAST
 from swarmscope.onboard.mapping.evidence import closes, is_passed
+from swarmscope.onboard.mapping.exchanging import begin_anew, tell_map
 from swarmscope.onboard.mapping.frames import agree, is_shared, keep_frame, own_place, spot_of
 from swarmscope.onboard.mapping.heard import distrusts, hear, note_wrong, review_heard, told_cell
-from swarmscope.onboard.mapping.memory import TALK
 from swarmscope.onboard.mapping.met import NOBODY, STRANGERS, note_heard, slot_of
-from swarmscope.onboard.mapping.news import keep_news
-from swarmscope.onboard.mapping.tracing import trace
-from swarmscope.onboard.mapping.words import Spot, number
-from swarmscope.onboard.percept import EVERYBODY, MAX_OUTBOX, NEVER_S, PEERS, Row
+from swarmscope.onboard.mapping.news import keep_news, trust_own_eyes
+from swarmscope.onboard.mapping.telling import MAPS, SCANS, WALLS, Talk, may_send, send, tell_closed, tell_scan
+from swarmscope.onboard.mapping.words import Spot
+from swarmscope.onboard.percept import NEVER_S, PEERS, Row
 from swarmscope.onboard.sharing.inbox import start_round
-from swarmscope.onboard.sharing.message import KIND_CHECK, OK, Head, decode, name_of
+from swarmscope.onboard.sharing.message import KIND_CHECK, OK, Head, decode
 from swarmscope.onboard.sharing.way_message import (
-    CELL_M,
     WAY_CORNERS,
     Place,
     encode_check,
-    encode_closed,
     place_of,
     read_check,
     read_closed,
@@ -38,7 +36,7 @@ from swarmscope.onboard.view import View
 
 TURNS = 10
 """Robots that are switched on at once ask one after the other."""
-SAVED_S = 2.0
+SAVED_S = 10.0
 """What has not been sent for so long may be sent at once."""
 EVERY = 8
 """A told cell is looked at for being free in one tick of so many."""
@@ -46,36 +44,10 @@ SAME = 4.0
 """A corner so near [cells] to one that was asked about is the same."""
 AHEAD_M = 40.0
 """So much of the way is asked about."""
-SMALL_M = 1.5
-"""What is smaller along both axes is not told: the way round it is hardly longer."""
 SHARE = 0.25
 """Of the time between two answers to one robot, that between two to robots that have never been in sight."""
 DOUBT_S = 20.0
 """So long nobody who has never been in sight is believed after one of them was wrong."""
-TRIES = 3
-"""What does not fit into a packet is traced anew, with fewer cells, so often."""
-
-
-class Talk(NamedTuple):
-    """How robots tell each other what closes their ways. Distances in m, times in s."""
-
-    cell_m: float
-    ask_s: float
-    """Time between two questions at least."""
-    again_s: float
-    """And at most, where somebody may hear them."""
-    reach_m: float
-    """What is farther from the one who answers is not told."""
-    cells: int
-    """Cells that an answer has at most."""
-    payload: int
-    """Bytes that a packet has at most."""
-    budget: float
-    """Bytes that may be sent in a second on average."""
-    keep_s: float
-    """So long others are believed."""
-    trust_m: float
-    """A robot that has gone so far without agreeing with one in sight begins anew in its own frame."""
 
 
 @jit
@@ -87,6 +59,7 @@ def listen(see: View, memory: Row, talk: Talk) -> None:
     keep_frame(see, memory, talk.trust_m / talk.cell_m)
     review_heard(memory, percept["now_s"], talk.keep_s)
     _doubt(see, memory, talk.cell_m)
+    trust_own_eyes(memory)
     for i in range(shared["told_n"]):
         k = shared["told_at"][i]
         if decode(percept["packet"][k], percept["packet_length"][k], see.header) != OK:
@@ -135,8 +108,8 @@ def _sender(see: View, memory: Row, talk: Talk, place: Place) -> Sender:
     if slot_of(memory, see.header[1]) >= 0:
         name = see.header[1]
     doubted_s = min(DOUBT_S, talk.keep_s) if name == STRANGERS else talk.keep_s
-    lies = place.frame == 0 or distrusts(memory, name, now, doubted_s)
-    if lies or (in_sight and not agree(memory, place, x, y)):
+    doubted = talk.what == WALLS and distrusts(memory, name, now, doubted_s)
+    if place.frame == 0 or doubted or (in_sight and not agree(memory, place, x, y)):
         return Sender(NOBODY, False, Spot(0.0, 0.0))
     at = Spot(x / talk.cell_m, y / talk.cell_m)
     if is_shared(memory, place):
@@ -158,80 +131,21 @@ def _answer(see: View, memory: Row, talk: Talk, packet: int) -> None:
     now = see.percept["now_s"]
     data, length = see.percept["packet"][packet], see.percept["packet_length"][packet]
     sender = _sender(see, memory, talk, place_of(data))
-    if not sender.known or not _may_send(see, memory):
+    if not sender.known or not may_send(see, memory):
         return
     pause = talk.ask_s * (SHARE if memory["met_id"][sender.slot] == STRANGERS else 1.0)
     if now - memory["met_told_s"][sender.slot] < pause:
         return
     memory["met_told_s"][sender.slot] = now
+    if talk.what == SCANS:
+        tell_scan(see, memory, talk)
+        return
     n = read_check(data, length, memory["talk_at"])
     _from_there(memory, sender.at, n, talk.cell_m)
     reach = talk.reach_m / talk.cell_m
     closed, u, v = closed_place(see, memory, talk.cell_m, memory["talk_at"], (n, reach))
     if closed:
-        _tell(see, memory, talk, (u, v))
-
-
-@jit_inner
-def _tell(see: View, memory: Row, talk: Talk, place: tuple[float, float]) -> None:
-    """Answer the question in ``see.header`` with what closes a place [cells], to be heard by everybody."""
-    out, shared = see.out, see.shared
-    seq = (shared["seq"] + 1) & 0xFFFF
-    head = Head(see.percept["id"], see.percept["boot"], seq, name_of(see.header[5], see.header[2]))
-    length = _write_closed(see, memory, talk, place, head)
-    if length == 0:
-        return
-    k = out["n_out"]
-    out["out_to"][k], out["out_length"][k], out["n_out"] = EVERYBODY, length, k + 1
-    shared["seq"] = seq
-    memory["budget"] -= length
-    memory["told"] += 1
-
-
-@jit_inner
-def _write_closed(see: View, memory: Row, talk: Talk, place: tuple[float, float], head: Head) -> int:
-    """Write what closes a place [cells] into the outbox.
-
-    Return its length, 0: there is none, or it is small. What is nearest to the place is told, as much of it as fits.
-    """
-    data = see.out["out"][see.out["n_out"]]
-    most, length = min(TALK, talk.cells), 0
-    for _ in range(TRIES):
-        n = trace(see, memory, talk.cell_m, place, (most, talk.reach_m / talk.cell_m))
-        if n == 0 or (n < most and _is_small(memory, n, SMALL_M / talk.cell_m)):
-            return 0
-        here = _from_here(see, memory, n, talk.cell_m)
-        length = encode_closed(head, here, memory["talk_cell"], n, data, talk.payload)
-        most = read_closed(data, length, memory["talk_at"])
-        if most >= n:
-            break
-    return int(length)
-
-
-@jit_inner
-def _is_small(memory: Row, n: int, small: float) -> bool:
-    """Tell whether the first ``n`` cells to tell lie within ``small`` [cells] along both axes."""
-    for axis in range(2):
-        low, high = memory["talk_cell"][0, axis], memory["talk_cell"][0, axis]
-        for k in range(n):
-            low, high = min(low, memory["talk_cell"][k, axis]), max(high, memory["talk_cell"][k, axis])
-        if high - low >= small:
-            return False
-    return True
-
-
-@jit_inner
-def _from_here(see: View, memory: Row, n: int, cell_m: float) -> Place:
-    """Turn numbers of cells of the map into those of a packet's, which begin with the one in which the robot is.
-
-    Return the middle of that one in the shared frame: so cells stay the same cells, wherever the frames' origins are.
-    """
-    ix, iy = math.floor(see.shared["x"] / cell_m), math.floor(see.shared["y"] / cell_m)
-    for k in range(n):
-        memory["talk_cell"][k, 0] = math.floor((memory["talk_cell"][k, 0] - ix) * cell_m / CELL_M + 0.5)
-        memory["talk_cell"][k, 1] = math.floor((memory["talk_cell"][k, 1] - iy) * cell_m / CELL_M + 0.5)
-    x, y = (ix + 0.5) * cell_m + memory["frame_x"], (iy + 0.5) * cell_m + memory["frame_y"]
-    return Place(x, y, number(memory["frame"]))
+        tell_closed(see, memory, talk, (u, v))
 
 
 @jit_inner
@@ -256,12 +170,6 @@ def _take_in(see: View, memory: Row, talk: Talk, packet: int) -> None:
             return
 
 
-@jit_inline
-def _may_send(see: View, memory: Row) -> bool:
-    """Tell whether there is room on the air, and in this tick."""
-    return bool(see.out["n_out"] < MAX_OUTBOX and memory["budget"] > 0.0)
-
-
 @jit
 def ask(see: View, memory: Row, talk: Talk, here: Spot) -> None:
     """Ask everybody who may hear it whether the way is closed, if there is reason to, and room on the air."""
@@ -269,10 +177,17 @@ def ask(see: View, memory: Row, talk: Talk, here: Spot) -> None:
     if memory["asked_s"] == NEVER_S:
         memory["asked_s"] = now - talk.ask_s * (1.0 - see.percept["id"] % TURNS / TURNS)  # not all at once
     since = now - memory["asked_s"]
-    if since < talk.ask_s or memory["way_n"] == 0 or not _may_send(see, memory):
+    if since < talk.ask_s or memory["way_n"] == 0 or not may_send(see, memory):
         return
     anybody, new_face = _who_is_there(see, memory)
     if not anybody:
+        return
+    if talk.what == MAPS:
+        if new_face:
+            begin_anew(memory)
+            _note_faces(see, memory)
+        if not tell_map(see, memory, talk, here):
+            memory["asked_s"] = now
         return
     first = _first_new(memory, here, talk.cell_m)
     if since < talk.again_s and first < 0 and not new_face:
@@ -291,8 +206,7 @@ def ask(see: View, memory: Row, talk: Talk, here: Spot) -> None:
     k = out["n_out"]
     length = encode_check(head, own_place(see, memory), memory["talk_at"], n, out["out"][k])
     if length > 0:
-        out["out_to"][k], out["out_length"][k], out["n_out"] = EVERYBODY, length, k + 1
-        memory["budget"] -= length
+        send(see, memory, talk, length)
         memory["asked_s"] = now
         memory["asked"] += 1
         _note_asked(see, memory, here, talk.cell_m)
@@ -337,11 +251,17 @@ def _first_new(memory: Row, here: Spot, cell_m: float) -> int:
 
 @jit_inner
 def _note_asked(see: View, memory: Row, here: Spot, cell_m: float) -> None:
-    """Note which way has been asked about, and whom in sight."""
+    """Note which way has been asked about, and who was."""
     n = _corners_ahead(memory, here, cell_m)
     memory["asked_n"] = n
     for k in range(n):
         memory["asked_u"][k], memory["asked_v"][k] = memory["way_u"][k], memory["way_v"][k]
+    _note_faces(see, memory)
+
+
+@jit_inner
+def _note_faces(see: View, memory: Row) -> None:
+    """Note who in sight has been asked."""
     for t in range(PEERS):
         k = slot_of(memory, see.shared["track_id"][t])
         if k >= 0:

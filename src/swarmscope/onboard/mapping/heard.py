@@ -117,6 +117,19 @@ def drop_answer(memory: Row, a: int) -> None:
 
 
 @jit
+def drop_cell(memory: Row, a: int, k: int) -> None:
+    """Forget told cell ``k``, one of answer ``a``; the answer, too, when it was the last."""
+    if memory["answer_n"][a] == 1:
+        drop_answer(memory, a)
+        return
+    for j in range(k, memory["heard_n"] - 1):
+        memory["heard_u"][j], memory["heard_v"][j] = memory["heard_u"][j + 1], memory["heard_v"][j + 1]
+        memory["heard_free"][j] = memory["heard_free"][j + 1]
+    memory["heard_n"] -= 1
+    memory["answer_n"][a] -= 1
+
+
+@jit
 def forget_heard(memory: Row) -> bool:
     """Forget all that others have told; return whether there was anything."""
     some = memory["answers_n"] > 0

@@ -8,9 +8,15 @@ import numpy as np
 
 from swarmscope._jit import jit, jit_inner
 from swarmscope.onboard.mapping.cells import is_fine, row_of
-from swarmscope.onboard.mapping.heard import is_told_near
-from swarmscope.onboard.mapping.words import ZERO, bit
+from swarmscope.onboard.mapping.heard import drop_cell, is_told_near, told_cell
+from swarmscope.onboard.mapping.words import ZERO, bit, number
 from swarmscope.onboard.percept import Row
+
+ASIDE = 3
+"""What others tell of is what the robot has seen itself when that is no more than so many cells aside: frames differ,
+and what is told a little beside where it is would close narrow gaps."""
+EVERY = 32
+"""An answer is compared with the own map in one tick of so many."""
 
 
 @jit
@@ -33,13 +39,47 @@ def keep_news(memory: Row, cells: np.ndarray, n: int) -> int:
 
 @jit_inner
 def _is_known(memory: Row, u: float, v: float) -> bool:
-    """Tell whether something stands at (u, v) [cells], a cell aside at most, by the own map, or others have told so."""
-    if is_told_near(memory, u, v):
-        return True
+    """Tell whether something stands at (u, v) [cells] by the own map, or others have told so."""
+    return is_told_near(memory, u, v) or _is_seen(memory, u, v)
+
+
+@jit_inner
+def _is_seen(memory: Row, u: float, v: float) -> bool:
+    """Tell whether something stands at (u, v) [cells], or `ASIDE`, by what the robot has seen itself."""
     if not is_fine(memory, u, v):
         return False
     ix, iy = int(math.floor(u)), int(math.floor(v))
     found = ZERO
-    for y in range(iy - 1, iy + 2):
-        found |= row_of(memory, ix - 1, y) & (bit(0) | bit(1) | bit(2))
-    return bool(found != ZERO)
+    for y in range(iy - ASIDE, iy + ASIDE + 1):
+        found |= row_of(memory, ix - ASIDE, y)
+    return bool(found & (bit(2 * ASIDE + 1) - bit(0)) != ZERO)
+
+
+@jit
+def trust_own_eyes(memory: Row) -> None:
+    """Forget told cells that the robot has seen by now, and those before and behind in the row: it knows better."""
+    first = memory["heard_n"]
+    for a in range(memory["answers_n"] - 1, -1, -1):
+        last = first - 1
+        first -= number(memory["answer_n"][a])
+        if a % EVERY == memory["ticks"] % EVERY:
+            _drop_seen(memory, a, first, last)
+
+
+@jit_inner
+def _drop_seen(memory: Row, a: int, first: int, last: int) -> None:
+    """Forget of answer ``a``, told cells ``first`` to ``last``, those that the robot has seen."""
+    after = True
+    for k in range(last, first - 1, -1):
+        now = _is_seen_cell(memory, k)
+        if now and after and (k == first or _is_seen_cell(memory, k - 1)):
+            drop_cell(memory, a, k)
+            memory["opened"] = 1
+        after = now
+
+
+@jit_inner
+def _is_seen_cell(memory: Row, k: int) -> bool:
+    """Tell whether the robot has seen told cell ``k`` itself."""
+    u, v = told_cell(memory, k)
+    return _is_seen(memory, u, v)

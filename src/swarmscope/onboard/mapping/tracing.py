@@ -7,6 +7,7 @@ nothing fits through, and told cells go straight on where they can: a packet hol
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -46,11 +47,45 @@ def trace(see: View, memory: Row, cell: float, place: tuple[float, float], terms
     if not found or most < 1:
         return 0
     start = Start(x - HALF, y - HALF)
+    unmark_all(memory)
+    x, y = _gather(see, memory, cell, start, (most, reach))
+    return int(put_in_rows(memory, start, (x, y), most))
+
+
+@jit
+def trace_scan(see: View, memory: Row, cell: float, most: int) -> int:
+    """Write what is seen ahead, thinned out and in rows, the nearest first, into ``memory["talk_cell"]``.
+
+    Return how many cells that are, not more than ``most``.
+    """
+    rig, percept = see.rig, see.percept
+    u, v = see.shared["x"] / cell, see.shared["y"] / cell
+    start = Start(int(math.floor(u)) - HALF, int(math.floor(v)) - HALF)
+    c, s = math.cos(percept["compass"]) / cell, math.sin(percept["compass"]) / cell
+    unmark_all(memory)
+    for n in range(rig.sensor.beams):
+        r = see.masked[n]
+        if rig.cos[n] <= 0.0 or not (rig.sensor.range_min <= r < rig.sensor.range_max) or see.unseen[n] != 0:
+            continue
+        x, y = u + r * (c * rig.cos[n] - s * rig.sin[n]), v + r * (s * rig.cos[n] + c * rig.sin[n])
+        mark(memory, int(math.floor(x)) - start.x, int(math.floor(y)) - start.y)
+    found, x, y = nearest_mark(memory, HALF, HALF)
+    return int(put_in_rows(memory, start, (x, y), most)) if found else 0
+
+
+@jit
+def unmark_all(memory: Row) -> None:
+    """Empty the square of marked cells."""
     memory["scratch_n"] = max(memory["scratch_n"], _SEEN + _MOST // 4)
     for k in range(_SEEN):
         memory["scratch"][k] = ZERO
-    x, y = _gather(see, memory, cell, start, (most, reach))
-    return int(_put_in_rows(memory, start, (x, y), most))
+
+
+@jit_inline
+def mark(memory: Row, x: int, y: int) -> None:
+    """Mark a cell of the square; nothing beyond it."""
+    if 0 <= x < 2 * HALF and 0 <= y < 2 * HALF:
+        memory["scratch"][y * _ROW + x // WORD] |= bit(x & (WORD - 1))
 
 
 @jit_inline
@@ -106,7 +141,7 @@ def _meet(memory: Row, x: int, y: int, last: int) -> int:
     """Put a cell of the square into the queue that ends at ``last``, and mark it; return where the queue ends."""
     if not (0 <= x < 2 * HALF and 0 <= y < 2 * HALF) or last >= _MOST:
         return last
-    memory["scratch"][y * _ROW + x // WORD] |= bit(x & (WORD - 1))
+    mark(memory, x, y)
     at, shift = _SEEN + last // 4, np.uint64(16 * (last & 3))
     rest = memory["scratch"][at] & ~(np.uint64(0xFFFF) << shift)
     memory["scratch"][at] = rest | (np.uint64(y * 2 * HALF + x) << shift)
@@ -144,8 +179,8 @@ def _is_apart(cells: np.ndarray, n: int, cell: tuple[int, int], least: float) ->
     return True
 
 
-@jit_inner
-def _put_in_rows(memory: Row, start: Start, first: tuple[int, int], most: int) -> int:
+@jit
+def put_in_rows(memory: Row, start: Start, first: tuple[int, int], most: int) -> int:
     """Tell of the marked cells, beginning with ``first``: write cells `apart`, each the next one in the same direction.
 
     Return how many there are, not more than ``most``.
@@ -159,7 +194,7 @@ def _put_in_rows(memory: Row, start: Start, first: tuple[int, int], most: int) -
         _unmark_round(memory, x, y)
         found, to_x, to_y = _next(memory, x, y, (dx, dy))
         if not found:
-            found, to_x, to_y = _nearest(memory, x, y)
+            found, to_x, to_y = nearest_mark(memory, x, y)
         dx, dy, x, y = to_x - x, to_y - y, to_x, to_y
     return n
 
@@ -187,8 +222,8 @@ def _next(memory: Row, x: int, y: int, step: tuple[int, int]) -> tuple[bool, int
     return best < 2**30, to_x, to_y
 
 
-@jit_inner
-def _nearest(memory: Row, x: int, y: int) -> tuple[bool, int, int]:
+@jit
+def nearest_mark(memory: Row, x: int, y: int) -> tuple[bool, int, int]:
     """Return the marked cell nearest to one, and whether any is left."""
     best, to_x, to_y = 2**30, x, y
     for j in range(2 * HALF):

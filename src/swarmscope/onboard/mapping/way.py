@@ -264,8 +264,11 @@ def forget_and_find(memory: Row, here: Spot, goal: Spot) -> int:
             kept = memory["kept_n"] = 0
             memory["room"] = FULL
             forget_all(memory)
-        if find_way(memory, here, goal) or (forget_heard(memory) and find_way(memory, here, goal)) or step == NOTHING:
+        if find_way(memory, here, goal) or step == NOTHING:
             break
+        if step == LEAST_ROOM and forget_heard(memory):
+            memory["room"], memory["stand_n"], step = FULL, stood, WHOLE
+            continue
         step += 1
         if step == NOBODY and stood == 0:
             step += 1

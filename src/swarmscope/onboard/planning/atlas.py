@@ -3,7 +3,8 @@
 The map holds cells in which something stands, in the frame of the robot's own odometry and compass; what it does not
 know counts as free. It goes along the shortest way to the goal that is open by that map, heads for the way's first
 corner, and searches again only when something closes the way or leaves a shorter one open. Robots that stand for long
-are in the way but not in the map. The safe directions and the guard are beneath, as with all planners.
+are in the way but not in the map. Neighbours are asked whether they know the way to be closed. The safe directions and
+the guard are beneath, as with all planners.
 """
 
 from __future__ import annotations
@@ -20,17 +21,19 @@ from swarmscope.onboard.deciding.evading import Evading, comes, evade, keep_righ
 from swarmscope.onboard.deciding.following import away_from_nearest
 from swarmscope.onboard.deciding.getting_away import nearest_free, watch_hold
 from swarmscope.onboard.deciding.progress import last_speed
-from swarmscope.onboard.mapping.asking import Talk, ask, listen
+from swarmscope.onboard.mapping.asking import ask, listen
 from swarmscope.onboard.mapping.cells import FULL, NODE, ask_for, draw_discs
 from swarmscope.onboard.mapping.evidence import learn
 from swarmscope.onboard.mapping.kept import SAME, find_narrow, lose_sight, review
 from swarmscope.onboard.mapping.memory import MAP, new_memory
+from swarmscope.onboard.mapping.telling import Talk
 from swarmscope.onboard.mapping.tight import Terms, find_tighter, note_gone
 from swarmscope.onboard.mapping.trail import note_passed
 from swarmscope.onboard.mapping.way import START_WITHIN, find_shorter, forget_and_find, is_on_way, nearest_open, shorten
 from swarmscope.onboard.mapping.words import Spot, number
 from swarmscope.onboard.percept import NEVER_S, PEERS, Row
 from swarmscope.onboard.perception.corridor import corridor_length
+from swarmscope.onboard.planners import Variant
 from swarmscope.onboard.reasons import (
     ADVANCE,
     ARRIVED,
@@ -45,11 +48,19 @@ from swarmscope.onboard.reasons import (
 from swarmscope.onboard.sharing.tracks import moves
 from swarmscope.onboard.view import View
 
-__all__ = ["MEMORY", "NAME", "NEEDS", "REASONS", "SUMMARY", "Params", "decide", "new_memory"]
+__all__ = ["MEMORY", "NAME", "NEEDS", "REASONS", "SUMMARY", "VARIANTS", "Params", "decide", "new_memory"]
 
 NAME = "atlas"
-SUMMARY = "Atlas: remembers what it has seen closed and goes the shortest way through the rest"
-NEEDS = "own scan, goal bearing and distance, relative poses of visible neighbours, odometry and compass"
+SUMMARY = "Atlas: remembers what it has seen closed, asks neighbours what closes its way, goes the shortest way"
+ALONE = "own scan, goal bearing and distance, relative poses of visible neighbours, odometry and compass"
+NEEDS = f"{ALONE}; what closes its way, on request"
+_ALL = {"share": 3, "budget_bps": 1e6, "payload": 140, "reach_m": 100.0}
+VARIANTS = {
+    "atlas-mute": Variant("Atlas alone: remembers, and neither asks nor tells", ALONE, {"share": 0}),
+    "atlas-scan": Variant("for studies: neighbours answer with what they see ahead", f"{ALONE}; scans", {"share": 2}),
+    "atlas-maps": Variant("for studies: Atlas that tells everybody all of its map", f"{ALONE}; maps", {"share": 3}),
+    "atlas-all": Variant("for studies: as atlas-maps, however much that is", f"{ALONE}; maps", _ALL),
+}
 MEMORY = MAP
 GAP_M = 0.25
 """A gap that is too narrow is kept closed so far round its middle."""
@@ -126,8 +137,9 @@ class Params(NamedTuple):
     """So long it is kept closed, each time twice as long."""
     forget_m: Metres = 0.0
     """What is farther away along x or y is forgotten, but for the fine layer; 0: nothing is. For studies."""
-    share: Flag = 0
-    """1: others are asked whether the way is closed, and answered; 0: nothing is sent."""
+    share: Annotated[int, Bounds(0, 3)] = 1
+    """1: others are asked whether the way is closed, and answered. 0: nothing is sent. For studies: 2: they answer with
+    what stands before them; 3: nobody is asked, but everybody tells all of its map."""
     ask_s: Seconds = 2.0
     """Time between two questions, and between two answers to the same robot, at least."""
     ask_again_s: Seconds = 6.0
@@ -139,7 +151,9 @@ class Params(NamedTuple):
     payload: Annotated[int, Bounds(50, 140, "B")] = 60
     """Bytes that a packet has at most."""
     budget_bps: Annotated[float, Bounds(0.0, 1e6, "bit/s")] = 250.0
-    """So much is sent on average at most."""
+    """So much is sent on average at most, ..."""
+    link_bytes: Annotated[int, Bounds(0, 64, "B")] = 23
+    """... the link's own bytes for each packet with it."""
     believe_s: Seconds = 180.0
     """So long others are believed."""
     trust_m: Metres = 20.0
@@ -156,7 +170,7 @@ def decide(see: View, memory: Row, params: Params) -> None:
     if memory["disc_half"] == 0:
         draw_discs(memory, (see.rig.body.radius_m + params.margin_m) / cell, see.rig.footprint / cell)
         memory["forget_n"] = math.ceil(params.forget_m / (cell * NODE))
-    if params.share == 1:
+    if params.share > 0:
         listen(see, memory, _talk(params))
     if memory["arrived"] or percept["goal_distance"] <= params.arrive_m:
         memory["arrived"] = 1
@@ -177,7 +191,7 @@ def decide(see: View, memory: Row, params: Params) -> None:
     _note_standing(see, memory, params.still_s, cell)
     learn(see, memory, cell, params.deep_m, params.cautious == 1)
     forgot = _keep_way(see, memory, params, here, goal)
-    if params.share == 1:
+    if params.share > 0:
         ask(see, memory, _talk(params), here)
     _drive(see, memory, params, here, forgot)
 
@@ -186,8 +200,8 @@ def decide(see: View, memory: Row, params: Params) -> None:
 def _talk(params: Params) -> Talk:
     """Return how others are asked and answered."""
     return Talk(
-        params.cell_m, params.ask_s, params.ask_again_s, params.reach_m, params.cells, params.payload,
-        params.budget_bps / 8.0, params.believe_s, params.trust_m,
+        params.share, params.cell_m, params.ask_s, params.ask_again_s, params.reach_m, params.cells, params.payload,
+        params.budget_bps / 8.0, params.link_bytes, params.believe_s, params.trust_m,
     )  # fmt: skip
 
 
