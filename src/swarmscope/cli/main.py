@@ -451,7 +451,7 @@ def tasks() -> None:
     "[bold]swarmscope reproduce nav-scope --engine ray --address auto[/bold]"
 )
 def reproduce(
-    name: Annotated[str, typer.Argument(help="nav-scope, ablations, sfm-mas, depository, traps, giwt or atlas.")],
+    name: Annotated[str, typer.Argument(help="nav-scope, ablations, sfm-mas, giwt, atlas, telescopes or others.")],
     maps: Maps = None,
     engine: EngineName = "local",
     workers: Workers = None,

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from adversary import closest
@@ -34,10 +34,10 @@ def guarded(ranges, v0, v, w, rig=None, rows=None):
     return rows.said("v"), rows.said("w"), bool(slowed)
 
 
-def naive_path(v0, v, w, body=BODY):
+def naive_path(v0, v, w, body=BODY, dt=DT):
     """Points of one tick at (v, w) from speed v0 and of the full braking after it, in a straight line."""
     x = y = yaw = 0.0
-    speed, h = v0, DT / FINE
+    speed, h = v0, dt / FINE
     points = [(x, y)]
     for _ in range(FINE):
         speed += min(body.a_max_mps2 * h, max(-body.a_max_mps2 * h, v - speed))
@@ -192,6 +192,27 @@ def test_each_robot_uses_only_its_half_of_the_gap(distance, v):
     wanted = naive_path(0.0, v, 0.0)
     if 2.0 * wanted[-1, 0] - wanted[FINE, 0] < half - 1e-3:
         assert new_v == v
+
+
+@settings(max_examples=200)
+@given(
+    gap=st.floats(0.0, 0.2), bearing=st.floats(-math.pi, math.pi), v=st.floats(0.0, 0.5), w=st.floats(-2.0, 2.0),
+    dt=st.sampled_from([0.1, 0.4, 0.8]),
+)  # fmt: skip
+@example(gap=0.01, bearing=-1.05, v=0.05, w=2.0, dt=0.8)
+def test_who_turns_stays_in_its_half_all_the_way(gap, bearing, v, w, dt):
+    """Not only where its way ends: one that turns past a neighbour and away is nearest in between."""
+    rig = rig_of(clearance_m=0.0)
+    rows = one_robot(rig)
+    distance = 2.0 * BODY.radius_m + gap
+    x, y = distance * math.cos(bearing), distance * math.sin(bearing)
+    rows.see([seen(3, x, y, math.pi)])
+    update_odometry(rows.percept, rows.shared)
+    update_tracks(rows.percept, rows.shared, rig, 0.0, 0.0)
+    rows.fill(dt_s=dt)
+    new_v, new_w, _ = guarded(scan_at(circles_world([(x, y, BODY.radius_m)]), rig), 0.0, v, w, rows=rows)
+    nearer = naive_path(0.0, new_v, new_w, dt=dt) @ (np.array([x, y]) / distance)
+    assert nearer.max() <= 0.5 * gap + 1e-5
 
 
 def test_a_neighbour_is_kept_off_even_when_its_returns_are_missing():

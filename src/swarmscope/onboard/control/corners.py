@@ -13,7 +13,7 @@ import numpy as np
 
 from swarmscope._jit import jit_inline, jit_inner
 from swarmscope.onboard.control.halves import Others, leaves_half, met_by
-from swarmscope.onboard.control.way import Way
+from swarmscope.onboard.control.way import Way, corner_of
 from swarmscope.onboard.perception.beams import beam_at
 from swarmscope.onboard.rig import SIGMAS, Rig
 from swarmscope.onboard.view import View
@@ -69,6 +69,8 @@ def strangers(v: float, dt: float, rig: Rig) -> Others:
 def matters_up_to(way: Way, others: Others) -> float:
     """Return from how far along a line of sight on others do not matter for a way [m], measured from this robot."""
     most = math.sqrt(way.x5 * way.x5 + way.y5 * way.y5) + way.brake
+    if way.turns:
+        most = way.reach + way.brake + way.bulge
     return others.touch + max(2.0 * most, most + others.met)
 
 
@@ -154,7 +156,13 @@ def _clear_past(see: View, n: int, side: int, way: Way, others: Others, enough: 
     along = max(along, corner.x + others.keeps)  # there it is the shortest way
     past = way_round(along, radius, corner)
     moved, stopped = come_along(way.x4, way.y4, past, corner), come_along(way.x5, way.y5, past, corner)
-    return leaves_half(moved, stopped, past.length - others.touch, others)
+    towards = max(moved, stopped)
+    if way.turns:
+        for piece in range(3):
+            x, y = corner_of(way, piece)
+            towards = max(towards, come_along(x, y, past, corner))
+        towards += way.bulge
+    return leaves_half(towards, stopped - moved, past.length - others.touch, others)
 
 
 @jit_inline

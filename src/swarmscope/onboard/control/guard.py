@@ -20,7 +20,7 @@ from swarmscope.onboard.control.halves import Others, leaves_room, met_by
 from swarmscope.onboard.control.horizon import horizon_speed
 from swarmscope.onboard.control.strangers import held_by_strangers
 from swarmscope.onboard.control.unseen import look_first, look_round, out_of_sight, reaches_between
-from swarmscope.onboard.control.way import STEPS, Way, closer, shadowed, way_of
+from swarmscope.onboard.control.way import STEPS, Way, bulge_of, closer, shadowed, way_of
 from swarmscope.onboard.percept import MAX_NEIGHBOURS, PEERS, Row
 from swarmscope.onboard.perception.frames import is_blurred
 from swarmscope.onboard.perception.mend import body_and_clearance, least_range
@@ -205,10 +205,28 @@ def _held_by(see: View, v: float, w: float, near: int) -> int:
     way = way_of(speed, v, w, rig.guarding.latency_s, see)
     if way.x5 * way.x5 + way.y5 * way.y5 + way.brake < 1e-10 and speed < STANDS_MPS:
         return FREE
-    others = other_robots(v, percept["dt_s"], rig)
-    if rig.guarding.others_mps > 0.0 and not _clear_of_tracks(see, way, others):
+    others, bulge = other_robots(v, percept["dt_s"], rig), _bulge(v, w, see)
+    held = _held_by_seen(see, way, others, bulge, near)
+    if held != FREE:
+        return held
+    held = _held_by_unseen(see, way, bulge)
+    if rig.guarding.strangers_mps > 0.0 and held_by_strangers(see, v, way, near):
+        held = R_HELD_STRANGER
+    if held == FREE and way.turns and rig.guarding.latency_s > 0.0:
+        # heeded at once, not as late as it may be: a way that turns later is another one, not just a longer one
+        at_once = way_of(speed, v, w, 0.0, see)
+        held = _held_by_seen(see, at_once, others, bulge, near)
+        if held == FREE:
+            held = _held_by_unseen(see, at_once, bulge)
+    return held
+
+
+@jit_inner
+def _held_by_seen(see: View, way: Way, others: Others, bulge: float, near: int) -> int:
+    """Return whether a way comes too near to what is seen, or leaves others less than their half: FREE, or why not."""
+    if see.rig.guarding.others_mps > 0.0 and not _clear_of_tracks(see, way, others):
         return R_HELD_ROBOT
-    bulge, enough = _bulge(v, w, see), matters_up_to(way, others)
+    enough = matters_up_to(way, others)
     for k in range(near):
         n = int(see.edges[k])
         held = _held_by_beam(see, n, way, others, bulge, enough)
@@ -216,12 +234,7 @@ def _held_by(see: View, v: float, w: float, near: int) -> int:
             return _what_is_at(see, n)
         if held != FREE:
             return held
-    held = _held_by_unseen(see, way, bulge)
-    if rig.guarding.strangers_mps > 0.0 and held_by_strangers(see, v, way, near):
-        held = R_HELD_STRANGER
-    if held == FREE and way.turns and rig.guarding.latency_s > 0.0:
-        held = _held_at_once(see, way_of(speed, v, w, 0.0, see), bulge, near)
-    return held
+    return FREE
 
 
 @jit_inner
@@ -249,26 +262,12 @@ def _held_by_unseen(see: View, way: Way, bulge: float) -> int:
     return R_HELD_UNSEEN
 
 
-@jit
-def _held_at_once(see: View, way: Way, bulge: float, near: int) -> int:
-    """Return what of all that stands holds a robot back that heeds its command at once, not as late as it may be.
-
-    A way that turns later is another one, not just a longer one.
-    """
-    for k in range(near):
-        n = int(see.edges[k])
-        s, need = _nearest_of(see, n, bulge)
-        if _meets(see, n, s, need, way):
-            return _what_is_at(see, n)
-    return _held_by_unseen(see, way, bulge)
-
-
 @jit_inline
 def _bulge(v: float, w: float, see: View) -> float:
     """Return how far an arc bulges out of the straight pieces drawn for it, ranges and motion rounded [m]."""
     step: float = see.percept["dt_s"] / STEPS
     speed: float = see.percept["speed"]
-    return ROUNDING_M + 0.125 * max(v, speed) * abs(w) * step * step
+    return ROUNDING_M + bulge_of(speed, v, w, step)
 
 
 @jit_inline

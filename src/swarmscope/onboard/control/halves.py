@@ -41,19 +41,23 @@ def leaves_room(px: float, py: float, s: float, way: Way, others: Others, rig: R
     nx, ny = px / s, py / s
     moved = way.x4 * nx + way.y4 * ny
     stopped = way.x5 * nx + way.y5 * ny
-    return leaves_half(moved, stopped, s - rig.body.radius_m - rig.guarding.clearance_m, others)
+    towards = max(moved, stopped)
+    if way.turns:
+        before = max(way.x1 * nx + way.y1 * ny, way.x2 * nx + way.y2 * ny, way.x3 * nx + way.y3 * ny)
+        towards = max(towards, before) + way.bulge
+    return leaves_half(towards, stopped - moved, s - rig.body.radius_m - rig.guarding.clearance_m, others)
 
 
 @jit_inline
-def leaves_half(moved: float, stopped: float, free: float, others: Others) -> bool:
+def leaves_half(towards: float, braking: float, free: float, others: Others) -> bool:
     """Tell whether a way leaves another robot its half of what is ``free`` between the two [m]; braking counts twice.
 
-    It has come nearer by ``moved`` at the next tick and by ``stopped`` when it stands. Before one that does not yield
-    the robot stands before it is reached, and a robot that drives away from it would be caught up with.
+    It comes nearer by ``towards`` at most, wherever on it that is: a way that turns may be nearest in its middle. Of
+    that ``braking`` is made after the next tick. Before one that does not yield the robot stands before it is reached,
+    and a robot that drives away from it would be caught up with.
     """
-    towards = max(moved, stopped)
     if not others.yield_:
         return towards + others.met <= free
     if towards <= 1e-6:
         return True
-    return towards + max(0.0, stopped - moved) <= 0.5 * free
+    return towards + max(0.0, braking) <= 0.5 * free

@@ -32,6 +32,14 @@ class Way(NamedTuple):
     """Whether it is not straight."""
     reach: float
     """Nothing of it is farther from where the robot is now."""
+    bulge: float
+    """How far the arc that is driven bulges out of the straight pieces."""
+
+
+@jit_inline
+def bulge_of(speed: float, v: float, w: float, step: float) -> float:
+    """Return how far an arc of ``step`` [s] between ``speed`` and ``v`` bulges out of the straight piece for it [m]."""
+    return 0.125 * max(v, speed) * abs(w) * step * step
 
 
 @jit_inline
@@ -39,6 +47,7 @@ def way_of(speed: float, v: float, w: float, late: float, see: View) -> Way:
     """Return the way of commanding (v, w) at ``speed``; for ``late`` [s] the robot goes on straight before that."""
     a_max = see.rig.body.a_max_mps2
     step = see.percept["dt_s"] / STEPS
+    bulge = bulge_of(speed, v, w, step)
     x0 = speed * late
     driven = abs(x0)
     speed, way = ramp(speed, v, a_max, step)
@@ -55,7 +64,7 @@ def way_of(speed: float, v: float, w: float, late: float, see: View) -> Way:
     x4, y4 = x3 + way * math.cos(3.5 * w * step), y3 + way * math.sin(3.5 * w * step)
     brake = speed * speed / (2.0 * a_max)
     x5, y5 = x4 + brake * math.cos(4.0 * w * step), y4 + brake * math.sin(4.0 * w * step)
-    return Way(x1, y1, x2, y2, x3, y3, x4, y4, x5, y5, brake, w != 0.0, driven + brake)
+    return Way(x1, y1, x2, y2, x3, y3, x4, y4, x5, y5, brake, w != 0.0, driven + brake, bulge)
 
 
 @jit_inline
