@@ -1,6 +1,6 @@
 """What traffic costs: robots that cross a world together against the same robots each alone in it.
 
-python benchmarks/alone.py --tasks hospital warehouse rubble --seeds 0-39 --set planner.name=atlas
+python benchmarks/alone.py --tasks hospital warehouse rubble --seeds 0-39 --set planner.name=atlas-mute
 
 Ways over the true shortest ways, means over the robots of a world that arrived both ways; the ratio of both means world
 by world, with a 95 % bootstrap interval over worlds; last arrivals in the same way.

@@ -1,6 +1,6 @@
 """A planner in all of ORION's mazes of some files: who arrives, over how long a way, in how much time.
 
-python benchmarks/orion.py ../shared/data/orion/*_even.npz --planner atlas nav-scope
+python benchmarks/orion.py ../shared/data/orion/*_even.npz --planner atlas-mute nav-scope
 
 Cells of 1.5 m, a LiDAR of 5 m, nothing known of the maze beforehand; each robot has its own goal.
 """
@@ -60,7 +60,7 @@ def main() -> None:
     """Read the options, play, print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("files", nargs="+", type=Path)
-    parser.add_argument("--planner", nargs="+", default=["atlas"])
+    parser.add_argument("--planner", nargs="+", default=["atlas-mute"])
     parser.add_argument("--mazes", type=int, help="only the first so many of each file")
     parser.add_argument("--cell", type=float, default=1.5, help="side of a cell [m]")
     parser.add_argument("--limit", type=float, default=1800.0, help="of a run [s]")

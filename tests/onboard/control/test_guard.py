@@ -196,13 +196,13 @@ def test_each_robot_uses_only_its_half_of_the_gap(distance, v):
 
 @settings(max_examples=200)
 @given(
-    gap=st.floats(0.0, 0.03), bearing=st.floats(-math.pi, math.pi), v=st.floats(0.0, 0.2), w=st.floats(-2.0, 2.0),
-    dt=st.sampled_from([0.1, 0.4, 0.8]),
+    clearance=st.sampled_from([0.0, 0.02]), gap=st.floats(0.0, 0.05), bearing=st.floats(-math.pi, math.pi),
+    v=st.floats(0.0, 0.2), w=st.floats(-2.0, 2.0), dt=st.sampled_from([0.1, 0.4, 0.8]),
 )  # fmt: skip
-@example(gap=0.01, bearing=-1.05, v=0.1, w=2.0, dt=0.8)
-def test_who_turns_stays_in_its_half_all_the_way(gap, bearing, v, w, dt):
+@example(clearance=0.0, gap=0.01, bearing=-1.05, v=0.1, w=2.0, dt=0.8)
+def test_who_turns_stays_in_its_half_all_the_way(clearance, gap, bearing, v, w, dt):
     """Not only where its way ends: one that turns past a neighbour and away is nearest in between."""
-    rig = rig_of(clearance_m=0.0)
+    rig = rig_of(clearance_m=clearance)
     rows = one_robot(rig)
     distance = 2.0 * BODY.radius_m + gap
     x, y = distance * math.cos(bearing), distance * math.sin(bearing)
@@ -212,7 +212,7 @@ def test_who_turns_stays_in_its_half_all_the_way(gap, bearing, v, w, dt):
     rows.fill(dt_s=dt)
     new_v, new_w, _ = guarded(scan_at(circles_world([(x, y, BODY.radius_m)]), rig), 0.0, v, w, rows=rows)
     nearer = naive_path(0.0, new_v, new_w, dt=dt) @ (np.array([x, y]) / distance)
-    assert nearer.max() <= 0.5 * gap + 1e-5
+    assert nearer.max() <= max(0.5 * (gap - clearance), 0.0) + (0.5 if gap > clearance else 0.0) * clearance + 1e-5
 
 
 def test_a_neighbour_is_kept_off_even_when_its_returns_are_missing():

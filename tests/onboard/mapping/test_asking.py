@@ -214,6 +214,19 @@ def test_a_forged_wall_where_the_robot_sees_that_there_is_none_is_not_believed_f
     assert pair.asker.memory["heard"] == heard
 
 
+def test_a_wall_told_a_little_before_the_true_one_is_no_lie():
+    """Frames differ: the robot sees through the told cells, up to the wall that they are meant for."""
+    pair = Pair(wall((3, -5), (3, 5)))
+    pair.knows.scan[:] = math.inf
+    pair.go(15)
+    pair.asker.receive([told_by(pair, [(-18, k) for k in range(-40, 41, 3)])])  # 0.12 m nearer, 4 m behind who tells
+    tick(pair.asker)
+    pair.asker.receive([])
+    for _ in range(40):
+        tick(pair.asker)
+    assert (pair.asker.memory["wrong_s"] < 0.0).all()
+
+
 def test_nobody_is_walled_in_by_what_it_is_told():
     pair = Pair().go(15)
     ring = [(-64 + round(24 * math.cos(a)), round(24 * math.sin(a))) for a in np.linspace(0.0, 2.0 * math.pi, 60)]

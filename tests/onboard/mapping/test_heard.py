@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from drawn_maps import map_of, way_of
 
-from swarmscope.onboard.mapping.cells import FULL, LEAST, LESS, PHASES, ask_for, is_open
+from swarmscope.onboard.mapping.cells import FULL, LEAST, LESS, PHASES, ask_for, is_open, set_cell
 from swarmscope.onboard.mapping.flood import flood
 from swarmscope.onboard.mapping.heard import (
     ANSWERS,
@@ -58,15 +58,33 @@ def test_told_cells_keep_the_least_room_free_whatever_is_asked_for(room):
     assert is_open(memory, 20.5 + r + 0.01, 0.5)
 
 
-def test_what_is_told_is_dropped_first_when_nothing_is_open():
+def test_what_is_told_is_dropped_before_any_cell_when_nothing_is_open():
     memory = map_of()
     angles = np.linspace(0.0, 2.0 * np.pi, 60, endpoint=False)
     told(memory, [(20.0 * np.cos(a), 20.0 * np.sin(a)) for a in angles])
     memory["kept_n"], memory["kept_u"][0], memory["kept_r"][0], memory["kept_s"][0] = 1, -30.0, 2.0, 100.0
-    assert forget_and_find(memory, HERE, GOAL) == 0
+    memory["stand_n"], memory["stand_u"][0], memory["stand_v"][0], memory["stand_r"][0] = 1, -30.0, 20.0, 2.0
+    assert forget_and_find(memory, HERE, GOAL) == 1
     assert memory["answers_n"] == memory["heard_n"] == 0
-    assert memory["kept_n"] == 1
+    assert memory["kept_n"] == memory["stand_n"] == 1
+    assert memory["room"] == FULL
     assert length(memory) == pytest.approx(40.0)
+
+
+def test_less_room_is_asked_for_before_what_is_told_is_dropped():
+    """A ring with a gap that the guard lets pass, and a wide one of which somebody has told that it is none."""
+    memory = map_of()
+    assert 2.0 * memory["disc_r"][LESS] < 6.0 < 2.0 * memory["disc_r"][FULL]
+    for k in range(-30, 31):
+        for ix, iy in ((-30, k), (30, k), (k, -30), (k, 30)):
+            in_gap = iy == 30 and -3 <= ix <= 1  # 6 cells between the middles of its jambs
+            if not (in_gap or (ix == 30 and abs(iy) < 8)):
+                set_cell(memory, ix, iy)
+    assert find_way(memory, HERE, GOAL)
+    told(memory, [(30.5, 2.0 * k + 0.5) for k in range(-4, 5)])
+    assert forget_and_find(memory, HERE, GOAL) == 2
+    assert memory["answers_n"] == 1
+    assert max(memory["way_v"][: int(memory["way_n"])]) > 28.0
 
 
 def test_enough_cells_that_are_seen_free_make_the_whole_answer_wrong():

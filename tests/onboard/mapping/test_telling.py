@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 from test_asking import ASKER, KNOWS, WALL, Pair
@@ -66,16 +64,31 @@ def test_who_meets_somebody_new_tells_all_of_it_again():
     pair = Telling(3, WALL).go(100)
     sent = len(pair.kinds(of_asker=False))
     third = one_robot(rig_of(), "atlas", 3, share=3)
-    third.scan[:] = math.inf
+    third.scan[:] = np.inf
     third.fill(goal_distance=12.0)
-    third.see([Seen(KNOWS, 2.0, 0.0, 0.0)])
-    pair.knows.see([Seen(ASKER, -4.0, 0.0, 0.0), Seen(3, -2.0, 0.0, 0.0)])
+    third.see([Seen(KNOWS, 3.5, 0.0, 0.0)])
+    pair.knows.see([Seen(ASKER, -4.0, 0.0, 0.0), Seen(3, -3.5, 0.0, 0.0)])
     for _ in range(40):
-        pair.knows.receive([data for _, data in third.outbox()])
-        tick(third)
+        pair.knows.receive([])
         tick(pair.knows)
-        pair.sent += [(False, to, data) for to, data in pair.knows.outbox()]
-    assert len(pair.kinds(of_asker=False)) >= sent
+        packets = [data for _, data in pair.knows.outbox()]
+        pair.sent += [(False, None, data) for data in packets]
+        third.receive(packets)
+        tick(third)
+    assert len(pair.kinds(of_asker=False)) > sent
+    third.receive([])
+    tick(third)
+    assert third.memory["heard_n"] > 40
+
+
+def test_maps_are_told_again_before_they_are_forgotten_also_by_who_has_arrived():
+    pair = Telling(3, WALL, believe_s=20.0).go(60)
+    pair.knows.fill(goal_distance=0.0)
+    pair.go(200)
+    for k in range(8):
+        pair.go(50)
+        assert pair.asker.memory["heard_n"] > 40, k
+    assert pair.knows.memory["arrived"]
 
 
 def test_small_things_may_be_robots_and_are_not_told():

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from swarmscope._jit import jit_inline, jit_inner
-from swarmscope.onboard.control.halves import Others, leaves_half, met_by
+from swarmscope.onboard.control.halves import Others, bulge_beyond, leaves_half, met_by
 from swarmscope.onboard.control.way import Way, corner_of
 from swarmscope.onboard.perception.beams import beam_at
 from swarmscope.onboard.rig import SIGMAS, Rig
@@ -156,13 +156,13 @@ def _clear_past(see: View, n: int, side: int, way: Way, others: Others, enough: 
     along = max(along, corner.x + others.keeps)  # there it is the shortest way
     past = way_round(along, radius, corner)
     moved, stopped = come_along(way.x4, way.y4, past, corner), come_along(way.x5, way.y5, past, corner)
-    towards = max(moved, stopped)
+    towards, free = max(moved, stopped), past.length - others.touch
     if way.turns:
         for piece in range(3):
             x, y = corner_of(way, piece)
             towards = max(towards, come_along(x, y, past, corner))
-        towards += way.bulge
-    return leaves_half(towards, stopped - moved, past.length - others.touch, others)
+        towards += bulge_beyond(way, free, rig.guarding.clearance_m)
+    return leaves_half(towards, stopped - moved, free, others)
 
 
 @jit_inline

@@ -31,6 +31,16 @@ def met_by(speed: float, v: float, dt: float, rig: Rig) -> float:
 
 
 @jit_inline
+def bulge_beyond(way: Way, free: float, clearance: float) -> float:
+    """Return how far a way bulges out of its pieces beyond its half of the ``clearance``, which covers it else [m].
+
+    Of a clearance that is not whole, ``free`` below 0, it covers a sixteenth of what is left: so that is never used up.
+    """
+    covered = 0.5 * clearance if free >= 0.0 else max(0.0, clearance + free) / 16.0
+    return max(0.0, way.bulge - covered)
+
+
+@jit_inline
 def leaves_room(px: float, py: float, s: float, way: Way, others: Others, rig: Rig) -> bool:
     """Tell whether a way leaves another its half of the gap to (px, py), or ends before one that does not yield comes.
 
@@ -41,11 +51,11 @@ def leaves_room(px: float, py: float, s: float, way: Way, others: Others, rig: R
     nx, ny = px / s, py / s
     moved = way.x4 * nx + way.y4 * ny
     stopped = way.x5 * nx + way.y5 * ny
-    towards = max(moved, stopped)
+    towards, free = max(moved, stopped), s - rig.body.radius_m - rig.guarding.clearance_m
     if way.turns:
         before = max(way.x1 * nx + way.y1 * ny, way.x2 * nx + way.y2 * ny, way.x3 * nx + way.y3 * ny)
-        towards = max(towards, before) + way.bulge
-    return leaves_half(towards, stopped - moved, s - rig.body.radius_m - rig.guarding.clearance_m, others)
+        towards = max(towards, before) + bulge_beyond(way, free, rig.guarding.clearance_m)
+    return leaves_half(towards, stopped - moved, free, others)
 
 
 @jit_inline

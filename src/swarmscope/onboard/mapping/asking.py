@@ -18,7 +18,7 @@ from swarmscope.onboard.mapping.exchanging import begin_anew, tell_map
 from swarmscope.onboard.mapping.frames import agree, is_shared, keep_frame, own_place, spot_of
 from swarmscope.onboard.mapping.heard import distrusts, hear, note_wrong, review_heard, told_cell
 from swarmscope.onboard.mapping.met import NOBODY, STRANGERS, note_heard, slot_of
-from swarmscope.onboard.mapping.news import keep_news, trust_own_eyes
+from swarmscope.onboard.mapping.news import is_seen, keep_news, trust_own_eyes
 from swarmscope.onboard.mapping.telling import MAPS, SCANS, WALLS, Talk, may_send, send, tell_closed, tell_scan
 from swarmscope.onboard.mapping.words import Spot
 from swarmscope.onboard.percept import NEVER_S, PEERS, Row
@@ -60,6 +60,8 @@ def listen(see: View, memory: Row, talk: Talk) -> None:
     review_heard(memory, percept["now_s"], talk.keep_s)
     _doubt(see, memory, talk.cell_m)
     trust_own_eyes(memory)
+    if talk.what == MAPS:
+        _tell_maps(see, memory, talk)
     for i in range(shared["told_n"]):
         k = shared["told_at"][i]
         if decode(percept["packet"][k], percept["packet_length"][k], see.header) != OK:
@@ -72,12 +74,12 @@ def listen(see: View, memory: Row, talk: Talk) -> None:
 
 @jit_inner
 def _doubt(see: View, memory: Row, cell_m: float) -> None:
-    """Note told cells that the robot sees to be free."""
+    """Note told cells that the robot sees to be free; not those a little beside what it has seen: frames differ."""
     u, v = see.shared["x"] / cell_m, see.shared["y"] / cell_m
     k = memory["ticks"] % EVERY
     while k < memory["heard_n"]:
         at_u, at_v = told_cell(memory, k)
-        if is_passed(see, at_u - u, at_v - v, cell_m):
+        if is_passed(see, at_u - u, at_v - v, cell_m) and not is_seen(memory, at_u, at_v):
             note_wrong(memory, k, see.percept["now_s"])
         k += EVERY
 
@@ -108,6 +110,7 @@ def _sender(see: View, memory: Row, talk: Talk, place: Place) -> Sender:
     if slot_of(memory, see.header[1]) >= 0:
         name = see.header[1]
     doubted_s = min(DOUBT_S, talk.keep_s) if name == STRANGERS else talk.keep_s
+    # whole scans and maps hold what walks, too: their senders do not lie for that
     doubted = talk.what == WALLS and distrusts(memory, name, now, doubted_s)
     if place.frame == 0 or doubted or (in_sight and not agree(memory, place, x, y)):
         return Sender(NOBODY, False, Spot(0.0, 0.0))
@@ -177,17 +180,10 @@ def ask(see: View, memory: Row, talk: Talk, here: Spot) -> None:
     if memory["asked_s"] == NEVER_S:
         memory["asked_s"] = now - talk.ask_s * (1.0 - see.percept["id"] % TURNS / TURNS)  # not all at once
     since = now - memory["asked_s"]
-    if since < talk.ask_s or memory["way_n"] == 0 or not may_send(see, memory):
+    if talk.what == MAPS or since < talk.ask_s or memory["way_n"] == 0 or not may_send(see, memory):
         return
     anybody, new_face = _who_is_there(see, memory)
     if not anybody:
-        return
-    if talk.what == MAPS:
-        if new_face:
-            begin_anew(memory)
-            _note_faces(see, memory)
-        if not tell_map(see, memory, talk, here):
-            memory["asked_s"] = now
         return
     first = _first_new(memory, here, talk.cell_m)
     if since < talk.again_s and first < 0 and not new_face:
@@ -210,6 +206,26 @@ def ask(see: View, memory: Row, talk: Talk, here: Spot) -> None:
         memory["asked_s"] = now
         memory["asked"] += 1
         _note_asked(see, memory, here, talk.cell_m)
+
+
+@jit_inner
+def _tell_maps(see: View, memory: Row, talk: Talk) -> None:
+    """Tell everybody who may hear it what is new, and all of it again to somebody new, and before it is forgotten."""
+    shared, now = see.shared, see.percept["now_s"]
+    anybody, new_face = _who_is_there(see, memory)
+    for t in range(PEERS):
+        if shared["track_id"][t] >= 0 and slot_of(memory, shared["track_id"][t]) < 0:
+            note_heard(memory, shared["track_id"][t], now)
+            new_face = True
+    if not anybody:
+        return
+    if new_face or now - memory["sent_s"] > 0.5 * talk.keep_s:
+        begin_anew(memory)
+        _note_faces(see, memory)
+        memory["sent_s"] = now
+    here = Spot(shared["x"] / talk.cell_m, shared["y"] / talk.cell_m)
+    if now - memory["asked_s"] >= talk.ask_s and not tell_map(see, memory, talk, here):
+        memory["asked_s"] = now
 
 
 @jit_inner

@@ -1,8 +1,9 @@
 """Maps told without being asked for: what comparisons of what is worth telling need (``share=3``).
 
 Robots that meet tell each other all that they know within reach, and then whatever is new: node by node the cells in
-which something stands, page after page, the near ones first. What has been told is kept in a table; where two nodes
-have one place in it, the older one is told again. Whoever meets somebody new begins anew.
+which something stands, square after square, the near ones first. What has been told is kept in a table; where more than
+eight nodes have one place in it, the oldest is told again. Whoever sees somebody new begins anew, and before it is
+forgotten. Who hears it keeps as much as of answers, 64 packets and 2048 cells.
 """
 
 from __future__ import annotations
@@ -14,10 +15,10 @@ import numpy as np
 from swarmscope._jit import jit, jit_inline, jit_inner
 from swarmscope.onboard.mapping.answering import is_sure
 from swarmscope.onboard.mapping.cells import NODE, is_fine, row_of
-from swarmscope.onboard.mapping.memory import SENT
+from swarmscope.onboard.mapping.memory import SENT, WAYS
 from swarmscope.onboard.mapping.pages import is_blocked
 from swarmscope.onboard.mapping.telling import SMALL_M, TRIES, Talk, from_here, may_send, send
-from swarmscope.onboard.mapping.tracing import HALF, Start, mark, nearest_mark, put_in_rows, unmark_all
+from swarmscope.onboard.mapping.tracing import BEHIND, HALF, Start, mark, nearest_mark, put_in_rows, unmark_all
 from swarmscope.onboard.mapping.words import WORD, ZERO, Spot, bit, lowest, number, without_lowest
 from swarmscope.onboard.percept import Row
 from swarmscope.onboard.sharing.message import Head
@@ -28,7 +29,7 @@ _SIDE = 2 * HALF
 """Cells along a side of a square that is told of at once."""
 _NODES = _SIDE // NODE
 _WORDS = _SIDE // WORD
-_ROWS = 2304
+_ROWS = BEHIND
 """Scratch behind the square: a bit for each node, ..."""
 _LIST = _ROWS + _NODES
 """... and a list of nodes."""
@@ -61,8 +62,9 @@ def tell_map(see: View, memory: Row, talk: Talk, here: Spot) -> bool:
 @jit
 def begin_anew(memory: Row) -> None:
     """Tell of everything again: somebody has come who has not heard it."""
-    for k in range(SENT):
-        memory["sent"][k] = 0
+    for place in range(SENT // WAYS):
+        for k in range(WAYS):
+            memory["sent"][place, k] = 0
 
 
 @jit_inner
@@ -72,20 +74,24 @@ def _tell_square(see: View, memory: Row, talk: Talk, start: Start, reach: float)
     head = Head(see.percept["id"], see.percept["boot"], seq, 0)
     data = see.out["out"][see.out["n_out"]]
     memory["scratch_n"] = max(memory["scratch_n"], _LIST + _NODES * _NODES)
-    most, length = talk.cells, 0
+    here = Spot(see.shared["x"] / talk.cell_m - start.x, see.shared["y"] / talk.cell_m - start.y)
+    most, length, fits = talk.cells, 0, False
     for _ in range(TRIES):
         if not _mark_things(see, memory, talk.cell_m, start, reach):
             return False
         _unmark_small(memory, SMALL_M / talk.cell_m)
         if _unmark_told(memory, start) < FEW:
             return False
-        _, x, y = nearest_mark(memory, HALF, HALF)
+        _, x, y = nearest_mark(memory, here.u, here.v)
         n = put_in_rows(memory, start, (x, y), most)
         place = from_here(see, memory, n, talk.cell_m)
         length = encode_closed(head, place, memory["talk_cell"], n, data, talk.payload)
         most = read_closed(data, length, memory["talk_at"])
-        if most >= n:
+        fits = most >= n
+        if fits:
             break
+    if not fits or length == 0:
+        return False
     _note_told(memory, start)
     see.shared["seq"] = seq
     memory["told"] += 1
@@ -151,7 +157,10 @@ def _note_told(memory: Row, start: Start) -> None:
             row = without_lowest(row)
             if _marks_of(memory, x, y) == ZERO:
                 kx, ky = start.x // NODE + x, start.y // NODE + y
-                memory["sent"][_at(kx, ky)] = _name(kx, ky)
+                at = _at(kx, ky)
+                for k in range(WAYS - 1, 0, -1):
+                    memory["sent"][at, k] = memory["sent"][at, k - 1]
+                memory["sent"][at, 0] = _name(kx, ky)
 
 
 @jit_inner
@@ -217,16 +226,19 @@ def _unmark_node(memory: Row, x: int, y: int) -> None:
 
 @jit_inner
 def _is_told(memory: Row, kx: int, ky: int) -> bool:
-    return number(memory["sent"][_at(kx, ky)]) == _name(kx, ky)
+    at, name, found = _at(kx, ky), _name(kx, ky), False
+    for k in range(WAYS):
+        found = found or number(memory["sent"][at, k]) == name
+    return found
 
 
 @jit_inner
 def _name(kx: int, ky: int) -> int:
-    """Return a node's name, not 0; they wrap round after 16384 m."""
+    """Return a node's name, not 0; they wrap round after 32768 nodes."""
     return (((ky & 0x7FFF) << 16) | (kx & 0xFFFF)) + 1
 
 
 @jit_inner
 def _at(kx: int, ky: int) -> int:
     """Return where in the table a node is kept."""
-    return ((_name(kx, ky) * _EVEN) >> 16) & (SENT - 1)
+    return ((_name(kx, ky) * _EVEN) >> 16) % (SENT // WAYS)

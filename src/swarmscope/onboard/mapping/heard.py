@@ -122,6 +122,7 @@ def drop_cell(memory: Row, a: int, k: int) -> None:
     if memory["answer_n"][a] == 1:
         drop_answer(memory, a)
         return
+    memory["answer_wrong"][a] -= memory["heard_free"][k]
     for j in range(k, memory["heard_n"] - 1):
         memory["heard_u"][j], memory["heard_v"][j] = memory["heard_u"][j + 1], memory["heard_v"][j + 1]
         memory["heard_free"][j] = memory["heard_free"][j + 1]

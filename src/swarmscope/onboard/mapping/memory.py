@@ -25,7 +25,9 @@ CORNERS = 64
 TALK = 112
 """Places and cells of a packet about a way."""
 SENT = 4096
-"""Nodes of which a robot knows that it has told, where all maps are told."""
+"""Nodes of which a robot knows that it has told, where all maps are told, ..."""
+WAYS = 8
+"""... so many at one place of the table."""
 SCRATCH = 12288 + 128
 """Words for searches; places up to 64 m x 64 m take the first 3072."""
 
@@ -149,14 +151,15 @@ MAP = np.dtype(
         ("told", np.int32),
         ("heard", np.int32),
         ("changed", np.int32),
-        ("sent", np.uint32, SENT),  # nodes of which it has told when all maps are told, by their places
+        ("sent_s", np.float64),  # since when all maps are told anew
+        ("sent", np.uint32, (SENT // WAYS, WAYS)),  # nodes of which it has told when all maps are told, by their places
         ("talk_at", np.float32, (TALK, 2)),  # scratch of packets
         ("talk_cell", np.int32, (TALK, 2)),
     ]
 )
 
 
-OF_SHARING = ("heard", "answer", "wrong", "frame", "met_", "asked", "budget", "told", "changed", "talk_")
+OF_SHARING = ("heard", "answer", "wrong", "frame", "met_", "asked", "budget", "told", "changed", "sent", "talk_")
 """What the fields begin with that are for asking others."""
 NEVER = (
     *("wrong_s", "asked_s", "met_s", "met_told_s", "met_asked_s"),
@@ -188,7 +191,7 @@ def used_bytes(memory: Row) -> int:
     whole -= sizes["disc"] * unused_rows
     if memory["budget"] == 0.0:
         whole -= sum(sizes[name] for name in sizes if name.startswith(OF_SHARING))
-    if not memory["sent"].any():
+    elif not memory["sent"].any():
         whole -= sizes["sent"]
     wanted = of_pages * memory["pages_n"] + of_slims * memory["slims_n"] + of_scratch * memory["scratch_n"]
     return int(whole + wanted)

@@ -27,6 +27,8 @@ _ROW = 2 * HALF // WORD
 _SEEN = 2 * HALF * _ROW
 """Words for a bit a cell; behind them the cells still to be looked round at, four in a word."""
 _MOST = 4096
+BEHIND = _SEEN + _MOST // 4
+"""Where the scratch goes on behind them."""
 
 
 class Start(NamedTuple):
@@ -63,7 +65,10 @@ def trace_scan(see: View, memory: Row, cell: float, most: int) -> int:
     start = Start(int(math.floor(u)) - HALF, int(math.floor(v)) - HALF)
     c, s = math.cos(percept["compass"]) / cell, math.sin(percept["compass"]) / cell
     unmark_all(memory)
-    for n in range(rig.sensor.beams):
+    first, last = 0, rig.sensor.beams - 1
+    if rig.sensor.field > 0:
+        first, last = see.shared["view_first"], see.shared["view_last"]
+    for n in range(first, last + 1):
         r = see.masked[n]
         if rig.cos[n] <= 0.0 or not (rig.sensor.range_min <= r < rig.sensor.range_max) or see.unseen[n] != 0:
             continue
@@ -76,7 +81,7 @@ def trace_scan(see: View, memory: Row, cell: float, most: int) -> int:
 @jit
 def unmark_all(memory: Row) -> None:
     """Empty the square of marked cells."""
-    memory["scratch_n"] = max(memory["scratch_n"], _SEEN + _MOST // 4)
+    memory["scratch_n"] = max(memory["scratch_n"], BEHIND)
     for k in range(_SEEN):
         memory["scratch"][k] = ZERO
 
@@ -223,9 +228,9 @@ def _next(memory: Row, x: int, y: int, step: tuple[int, int]) -> tuple[bool, int
 
 
 @jit
-def nearest_mark(memory: Row, x: int, y: int) -> tuple[bool, int, int]:
+def nearest_mark(memory: Row, x: float, y: float) -> tuple[bool, int, int]:
     """Return the marked cell nearest to one, and whether any is left."""
-    best, to_x, to_y = 2**30, x, y
+    best, to_x, to_y = float(2**30), 0, 0
     for j in range(2 * HALF):
         for w in range(_ROW):
             word = memory["scratch"][j * _ROW + w]

@@ -243,12 +243,13 @@ def _join(memory: Row, here: Spot) -> None:
 
 @jit
 def forget_and_find(memory: Row, here: Spot, goal: Spot) -> int:
-    """Find a way; where the map closes everything, forget what others told, who stands, ask for less room, forget all.
+    """Find a way; where the map closes everything, leave out who stands, ask for less room, forget what others told.
 
-    Less room is what the guard lets pass, then what may be as wide as that, since maps err by a cell, then gaps that
-    turned out too narrow once before. Return how far that went, 0 to 3.
+    Less room is what the guard lets pass, then what may be as wide as that, since maps err by a cell. What others told
+    goes when that is no help, and all begins again; then gaps that turned out too narrow once before, then everything.
+    Return how far that went, 0 to 3, at least 1 when what others told is forgotten.
     """
-    stood, kept = memory["stand_n"], memory["kept_n"]
+    stood, kept, told = memory["stand_n"], memory["kept_n"], 0
     step = WHOLE
     while True:
         if step == NOBODY:
@@ -267,7 +268,7 @@ def forget_and_find(memory: Row, here: Spot, goal: Spot) -> int:
         if find_way(memory, here, goal) or step == NOTHING:
             break
         if step == LEAST_ROOM and forget_heard(memory):
-            memory["room"], memory["stand_n"], step = FULL, stood, WHOLE
+            memory["room"], memory["stand_n"], step, told = FULL, stood, WHOLE, 1
             continue
         step += 1
         if step == NOBODY and stood == 0:
@@ -276,5 +277,5 @@ def forget_and_find(memory: Row, here: Spot, goal: Spot) -> int:
             step += 1
     memory["room"], memory["stand_n"], memory["kept_n"] = FULL, stood, kept
     if step <= NOBODY:
-        return step
+        return max(step, told)
     return 3 if step == NOTHING else 2

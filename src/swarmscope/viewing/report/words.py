@@ -44,6 +44,7 @@ TITLES = {
     "plan_us_p50": "t_plan, median",
     "plan_us_p99": "t_plan, 99th percentile",
     "bytes_on_air": "Bytes on air per run",
+    "air_bps": "On air per robot, bit/s",
 }
 SHARES = frozenset(
     {
