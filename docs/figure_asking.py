@@ -14,7 +14,8 @@ import numpy as np
 from figure_style import STYLE
 from figure_worlds import draw_world, played
 
-SEED = 8
+SEED = 15
+"""Of 0 to 19 the one in which asking saves most nearly what it saves on average."""
 PLANNERS = {"mute": "atlas-mute", "asking": "atlas"}
 OUT = Path(__file__).resolve().parent / "pictures" / "asking.png"
 
